@@ -1,0 +1,1 @@
+"""The asteroid: its surface, its gravity, and the distance to it, as arrays."""

@@ -1,0 +1,1 @@
+"""Gravity fields of a small body, as compiled kernels behind one record."""

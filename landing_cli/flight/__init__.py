@@ -1,0 +1,1 @@
+"""The spacecraft near the asteroid: dynamics, trajectories and re-flight."""

@@ -1,0 +1,1 @@
+"""Where on the asteroid the spacecraft can land: the reachable domain."""

@@ -1,0 +1,1 @@
+"""Results on disk: journal, HDF5 store, tables and figures."""
