@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.flight.spacecraft import Spacecraft
+from landing_cli.results.columns import Column
 
 FloatArray = NDArray[np.float64]
 
@@ -82,18 +83,6 @@ class LandingCase:
     def descent_s(self) -> float:
         """Time of flight of the descent stage, s."""
         return self.tof_s - self.final_stage_s
-
-
-@dataclass(frozen=True)
-class Column:
-    """One per-facet quantity, in the file and in the CSV alike."""
-
-    name: str
-    dtype: str
-    units: str
-    description: str
-    shape: tuple[int, ...] = ()
-    flags: type[IntEnum] | None = None
 
 
 FACET_COLUMNS: tuple[Column, ...] = (
