@@ -1,0 +1,83 @@
+"""The gravity models behind one set of compiled functions, chosen by the integer ``kind``.
+
+Every function takes ``(kind, params, x, y, z)``: ``int(field.kind)``, ``field.params`` and a position in
+the body frame, m. Call them with exactly these types, so that each compiles once. Second derivatives are
+ordered xx, yy, zz, xy, xz, yz. Nothing is allocated, and a position at a singularity gives inf or nan.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from landing_cli.body.gravity.dipole import (
+    dipole_acceleration,
+    dipole_acceleration_and_gradient,
+    dipole_curvature,
+    dipole_potential,
+)
+from landing_cli.body.gravity.field import GravityKind
+from landing_cli.body.gravity.harmonics import (
+    harmonics_acceleration,
+    harmonics_acceleration_and_gradient,
+    harmonics_curvature,
+    harmonics_potential,
+)
+from landing_cli.body.gravity.kernel_types import Params, Symmetric, Vector, VectorAndSymmetric
+from landing_cli.body.gravity.point_mass import (
+    point_acceleration,
+    point_acceleration_and_gradient,
+    point_curvature,
+    point_potential,
+)
+
+_POINT_MASS = int(GravityKind.POINT_MASS)
+_HARMONICS = int(GravityKind.HARMONICS)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def potential(kind: int, params: Params, x: float, y: float, z: float) -> float:
+    """Return the potential U, m2/s2, positive (GM/r + ...)."""
+    if kind == _POINT_MASS:
+        return point_potential(params[0], x, y, z)
+    if kind == _HARMONICS:
+        return harmonics_potential(params, x, y, z)
+    return dipole_potential(params, x, y, z)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def acceleration(kind: int, params: Params, x: float, y: float, z: float) -> Vector:
+    """Return the acceleration (gx, gy, gz), m/s2: the gradient of U."""
+    if kind == _POINT_MASS:
+        return point_acceleration(params[0], x, y, z)
+    if kind == _HARMONICS:
+        return harmonics_acceleration(params, x, y, z)
+    return dipole_acceleration(params, x, y, z)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def acceleration_and_gradient(kind: int, params: Params, x: float, y: float, z: float) -> VectorAndSymmetric:
+    """Return the acceleration, m/s2, then its gradient, 1/s2: nine numbers that share their work."""
+    if kind == _POINT_MASS:
+        return point_acceleration_and_gradient(params[0], x, y, z)
+    if kind == _HARMONICS:
+        return harmonics_acceleration_and_gradient(params, x, y, z)
+    return dipole_acceleration_and_gradient(params, x, y, z)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def gradient(kind: int, params: Params, x: float, y: float, z: float) -> Symmetric:
+    """Return the acceleration's gradient (gxx, gyy, gzz, gxy, gxz, gyz), 1/s2: the Hessian of U."""
+    g = acceleration_and_gradient(kind, params, x, y, z)
+    return g[3], g[4], g[5], g[6], g[7], g[8]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def curvature(
+    kind: int, params: Params, x: float, y: float, z: float, lx: float, ly: float, lz: float
+) -> Symmetric:
+    """Return sum_k d3U/(dxi dxj dxk) l_k, in the gradient's order, 1/(m s2) times the unit of l."""
+    if kind == _POINT_MASS:
+        return point_curvature(params[0], x, y, z, lx, ly, lz)
+    if kind == _HARMONICS:
+        return harmonics_curvature(params, x, y, z, lx, ly, lz)
+    return dipole_curvature(params, x, y, z, lx, ly, lz)
