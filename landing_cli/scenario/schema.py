@@ -1,0 +1,237 @@
+"""The scenario: every key, its unit, its range and its default."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag, ValidationError
+
+from landing_cli.scenario.messages import KeyPath, refusal
+from landing_cli.scenario.schema_base import (
+    Auto,
+    Number3,
+    Positive3,
+    Seconds,
+    Section,
+    Times,
+    exactly_one,
+    word_or_value,
+    wrong,
+)
+from landing_cli.scenario.schema_body import Body
+from landing_cli.scenario.translate import problems_of
+
+
+class SpacecraftSection(Section):
+    """The lander: a point mass with one throttleable thruster."""
+
+    mass_kg: float = Field(gt=0, le=1e7, description="initial mass, kg")
+    thrust_max_n: float = Field(gt=0, le=1e7, description="largest thrust, N")
+    isp_s: float = Field(ge=1, le=1e6, description="specific impulse, s")
+    propellant_kg: float | None = Field(None, gt=0, le=1e7, description="propellant on board, kg; a bound")
+
+    def model_post_init(self, context: Any, /) -> None:
+        """Refuse a spacecraft made of propellant alone."""
+        if self.propellant_kg is not None and self.propellant_kg >= self.mass_kg:
+            raise wrong(
+                "propellant_kg",
+                f"{self.propellant_kg:g} is not below mass_kg = {self.mass_kg:g}",
+                "mass_kg includes the propellant",
+            )
+
+
+class InitialState(Section):
+    """Where a descent begins, in the rotating body frame."""
+
+    name: str = Field(
+        pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$",
+        description="name in tables and files: a letter, then letters, digits, _ or -",
+    )
+    position_km: Number3 | None = Field(None, description="position in the body frame, km")
+    position_m: Number3 | None = Field(
+        None, description="position in the body frame, m, instead of position_km"
+    )
+    velocity_m_s: Number3 = Field(
+        (0.0, 0.0, 0.0), description="velocity relative to the rotating body frame, m/s"
+    )
+    tof_s: Times | None = Field(None, description="times of flight of this state, s, instead of reach.tof_s")
+
+    def model_post_init(self, context: Any, /) -> None:
+        """Refuse two positions, none, one beyond any mission, or a speed of light."""
+        exactly_one(self, "position_km", "position_m")
+        key = "position_m" if self.position_km is None else "position_km"
+        if max(map(abs, self.start_m)) > 1e9:
+            raise wrong(key, "is more than a million km from the body", "check the unit")
+        if max(map(abs, self.velocity_m_s)) > 1e4:
+            raise wrong("velocity_m_s", "is faster than 10 km/s", "check the unit: m/s")
+
+    @property
+    def start_m(self) -> Number3:
+        """Position in the body frame, m."""
+        if self.position_m is not None:
+            return self.position_m
+        assert self.position_km is not None
+        x, y, z = self.position_km
+        return 1000 * x, 1000 * y, 1000 * z
+
+
+class SectionMethod(Section):
+    """The paper's plane section and expansion."""
+
+    h_m: Auto | Annotated[Annotated[float, Field(gt=0, le=1e6)], Tag("value")] = Field(
+        default="auto",
+        discriminator=Discriminator(word_or_value),
+        description="band width h, m, or auto: the mean edge",
+    )
+    azimuth_deg: float = Field(
+        default=0.0,
+        ge=-360,
+        le=360,
+        description="azimuth of the section plane about the line to the initial position, deg",
+    )
+
+
+class Reach(Section):
+    """Where the spacecraft can land: initial states, times of flight and constraints."""
+
+    initial_states: tuple[InitialState, ...] = Field(
+        min_length=1, max_length=1000, description="list of states from which the descent begins"
+    )
+    tof_s: Times | None = Field(None, description="time of flight, s: a number, or a list of them")
+    final_stage_s: Seconds = Field(
+        description="part of the time of flight that the final landing stage takes, s"
+    )
+    ellipsoid_m: Auto | Annotated[Positive3, Tag("value")] = Field(
+        "auto",
+        discriminator=Discriminator(word_or_value),
+        description="keep-out ellipsoid, semi-axes in m: [a, b, c], or auto: the least that holds the body",
+    )
+    glide_slope_half_angle_deg: float = Field(
+        60.0,
+        gt=0,
+        lt=90,
+        description="half-angle of the final stage's cone about the outward facet normal, deg",
+    )
+    handover: Literal["outside", "on_ellipsoid"] = Field(
+        "outside",
+        description="where the descent stage may end: outside | on_ellipsoid (the paper's transition point)",
+    )
+    descent: Literal["free", "extremal"] = Field(
+        "free", description="family of descent trajectories: free (conic) | extremal (the paper's)"
+    )
+    final_stage_thrust: Literal["compensated", "paper"] = Field(
+        "compensated",
+        description="the final stage's thrust bound holds for: compensated (the real thrust) | paper (eq 14)",
+    )
+    terrain: Literal["report", "require"] = Field(
+        "report", description="whether a path that cuts the mesh is a landing: report | require (it is not)"
+    )
+    method: Literal["traverse", "section"] = Field(
+        "traverse", description="how the domain is found: traverse (every facet) | section (the paper's)"
+    )
+    section: SectionMethod = Field(
+        SectionMethod(),
+        description="parameters of the section method",
+    )
+
+    def model_post_init(self, context: Any, /) -> None:
+        """Refuse states without a name of their own or without a time, and times that contradict."""
+        self._check_names()
+        if self.tof_s is not None:
+            self._check_times(self.tof_s, "tof_s")
+        for index, state in enumerate(self.initial_states):
+            if state.tof_s is not None:
+                self._check_times(state.tof_s, f"initial_states.{index}.tof_s")
+            elif self.tof_s is None:
+                raise wrong(
+                    "tof_s", "is missing", f"give reach.tof_s, or tof_s in initial state {state.name}"
+                )
+
+    def times_of(self, state: InitialState) -> tuple[float, ...]:
+        """Return the times of flight that are flown from one initial state, s."""
+        times = self.tof_s if state.tof_s is None else state.tof_s
+        assert times is not None
+        return times
+
+    def cases(self) -> list[tuple[str, InitialState, float]]:
+        """Case name (``north_pole_700s``), initial state and time of flight, s, of every case."""
+        return [
+            (f"{state.name}_{tof_s:.12g}s", state, tof_s)
+            for state in self.initial_states
+            for tof_s in self.times_of(state)
+        ]
+
+    def _check_names(self) -> None:
+        first: dict[str, int] = {}
+        for index, state in enumerate(self.initial_states):
+            if state.name in first:
+                raise wrong(
+                    f"initial_states.{index}.name",
+                    f"{state.name} is the name of initial state {first[state.name]} too",
+                    "give each its own",
+                )
+            first[state.name] = index
+
+    def _check_times(self, times: tuple[float, ...], key: str) -> None:
+        for index, tof_s in enumerate(times):
+            if tof_s <= self.final_stage_s:
+                raise wrong(
+                    "final_stage_s",
+                    f"{self.final_stage_s:g} is not shorter than the time of flight of {tof_s:g} s",
+                    f"the final stage is part of the flight: shorten it, or lengthen {key}",
+                )
+            if any(f"{tof_s:.12g}" == f"{earlier:.12g}" for earlier in times[:index]):
+                raise wrong(f"{key}.{index}", f"{tof_s:g} is in the list twice", "remove one")
+
+
+class Scenario(Section):
+    """One body, one spacecraft, and what is asked of them."""
+
+    name: str = Field(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$",
+        description="name of the scenario and of its results: letters, digits, _ . -",
+    )
+    body: Body = Field(description="the asteroid")
+    spacecraft: SpacecraftSection = Field(description="the lander")
+    reach: Reach = Field(description="the reachable domain: `reach run`")
+
+
+def from_tree(tree: Any, places: Mapping[KeyPath, str] | None = None, source: str = "scenario") -> Scenario:
+    """Check plain values and make the scenario of them.
+
+    Parameters
+    ----------
+    tree : dict of plain values
+        As they stand in a scenario file.
+    places : mapping, optional
+        "file:line" of each key path, for messages.
+    source : str
+        What to call the scenario in messages.
+
+    Returns
+    -------
+    Scenario
+
+    Raises
+    ------
+    InputRefused
+        Something is wrong; each problem is named with its place, dotted key, value and fix.
+    """
+    try:
+        # JSON's own strictness: a list is a tuple, but text is no number
+        return Scenario.model_validate_json(json.dumps(tree))
+    except ValidationError as error:
+        problems = problems_of(error, Scenario)
+    raise refusal(problems, places or {}, source)
+
+
+def to_tree(scenario: Scenario) -> dict[str, Any]:
+    """Return every key with its value or default, as plain values that `from_tree` reads back."""
+    return scenario.model_dump(mode="json")
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of scenario files, for editors."""
+    return Scenario.model_json_schema()
