@@ -1,0 +1,232 @@
+"""Make the truth tables: choose facets, solve them by collocation, check them, write CSV.
+
+Run from anywhere: ``nice python tests/truth/make_truth.py [table ...]``; see README.md beside it.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import radau
+from collocation import Answer, Local, best_over_starts, refine, solve, starts
+from problem import Problem
+from reflight import refly
+from scipy.interpolate import RBFInterpolator
+from shape import Shape, degree_two, least_ellipsoid, read_obj
+
+HERE = Path(__file__).resolve().parent
+SHAPES = HERE.parent.parent / "shapes"
+INTERVALS = 60
+SURVEY_INTERVALS = 30
+SURVEY_STARTS = ("straight", "far", "right")
+BINDS = 1e-3  # an ellipsoid multiplier (scaled) above this shapes the path
+
+NORTH, EQUATOR, MIDDLE = (0.0, 0.0, 800.0), (800.0, 0.0, 0.0), (600.0, 0.0, 500.0)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One problem without its facet, and the shape its facets come from."""
+
+    name: str
+    problem: Problem
+    shape: Shape
+
+
+def bennu(name: str, r0: tuple[float, float, float], tof: float, **reading: str) -> Case:
+    shape = read_obj(SHAPES / "bennu.obj")
+    gravity = ("harmonics", 4.892, 246.0, *np.round(degree_two(shape, 246.0), 9))
+    semi = tuple(np.ceil(least_ellipsoid(shape) * 1e3) / 1e3)
+    omega = 2 * np.pi / (4.288 * 3600)
+    problem = Problem(
+        r0, (0.0, 0.0, 0.0), omega, gravity, 2000.0, 20.0, 400.0, tof, 200.0, semi, np.pi / 3, **reading
+    )
+    return Case(f"{name}_{tof:.0f}s", problem, shape)
+
+
+def bacchus(tof: float) -> Case:
+    shape = read_obj(SHAPES / "bacchus.obj")
+    semi = tuple(np.ceil(least_ellipsoid(shape) * 1e3) / 1e3)
+    omega, gravity = 2 * np.pi / (14.9 * 3600), ("dipole", 18.083, 0.437, 463.1)
+    r0 = (0.0, 0.0, 600.0)
+    problem = Problem(r0, (0.0, 0.0, 0.0), omega, gravity, 2000.0, 20.0, 400.0, tof, 300.0, semi, np.pi / 3)
+    return Case(f"bacchus_north_pole_{tof:.0f}s", problem, shape)
+
+
+def eros(tof: float) -> Case:
+    shape = read_obj(SHAPES / "eros.obj")
+    semi = tuple(np.ceil(least_ellipsoid(shape) * 1e1) / 1e1)
+    gravity = ("dipole", 4.4628e5, 0.528, 15364.0)
+    r0 = (0.0, 0.0, 16000.0)
+    problem = Problem(
+        r0, (0.0, 0.0, 0.0), 3.3117e-4, gravity, 1000.0, 20.0, 400.0, tof, 800.0, semi, np.pi / 3
+    )
+    return Case(f"eros_north_pole_{tof:.0f}s", problem, shape)
+
+
+def survey_tau(case: Case, facet: int, rng: np.random.Generator) -> float:
+    """A quick tau, for choosing facets only."""
+    problem = case.problem.at(case.shape.centroids[facet], case.shape.normals[facet])
+    found = starts(problem, SURVEY_INTERVALS, rng)
+    taus = [solve(problem, SURVEY_INTERVALS, "tau", *found[name], 1.2) for name in SURVEY_STARTS]
+    return min((t.tau for t in taus if t.solved), default=np.nan)
+
+
+def predict(case: Case, known: dict[int, float]) -> np.ndarray:
+    """Tau of every facet, interpolated over place and normal from the known ones."""
+    place = case.shape.centroids / np.abs(case.shape.centroids).max()
+    features = np.hstack([2 * place, case.shape.normals])
+    facets = np.array([f for f, tau in known.items() if np.isfinite(tau)])
+    values = np.array([known[f] for f in facets])
+    return RBFInterpolator(features[facets], values, kernel="linear", neighbors=40)(features)
+
+
+def near_boundary(count: int, far: int, survey: int = 90) -> Callable[..., list[int]]:
+    """Chooser: facets with tau nearest 1 after two rounds of prediction, and some far ones."""
+
+    def choose(case: Case, rng: np.random.Generator) -> list[int]:
+        total = len(case.shape.faces)
+        known = {int(f): survey_tau(case, f, rng) for f in rng.choice(total, survey, replace=False)}
+        for extra in (count, 2 * count):
+            guess = predict(case, known)
+            guess[list(known)] = np.inf
+            for f in np.argsort(np.abs(guess - 1))[:extra]:
+                known[int(f)] = survey_tau(case, int(f), rng)
+        solved = sorted((f for f in known if np.isfinite(known[f])), key=lambda f: abs(known[f] - 1))
+        others = [f for f in solved[count:] if abs(known[f] - 1) > 0.1]
+        return solved[:count] + [int(f) for f in rng.choice(others, min(far, len(others)), replace=False)]
+
+    return choose
+
+
+def far_side(count: int) -> Callable[..., list[int]]:
+    """Chooser: facets that the start does not see, where the ellipsoid should bind."""
+
+    def choose(case: Case, rng: np.random.Generator) -> list[int]:
+        r0 = np.array(case.problem.r0) / case.problem.length
+        centroids = case.shape.centroids
+        cosine = centroids @ r0 / np.linalg.norm(centroids, axis=1)
+        return [int(f) for f in rng.choice(np.flatnonzero(cosine < -0.1), count, replace=False)]
+
+    return choose
+
+
+def spread(near: int, rest: int) -> Callable[..., list[int]]:
+    """Chooser: some facets near the boundary and the rest anywhere."""
+
+    def choose(case: Case, rng: np.random.Generator) -> list[int]:
+        chosen = near_boundary(near, 0, survey=40)(case, rng)
+        others = np.setdiff1d(np.arange(len(case.shape.faces)), chosen)
+        return chosen + [int(f) for f in rng.choice(others, rest, replace=False)]
+
+    return choose
+
+
+def tables() -> dict[str, list[tuple[Case, Callable[..., list[int]]]]]:
+    """The tables by name: cases and how their facets are chosen."""
+    places = {"north_pole": NORTH, "equator": EQUATOR, "mid_latitude": MIDDLE}
+
+    def over_bennu(tof: float, chooser: Callable[..., list[int]], **reading: str) -> list:
+        return [(bennu(name, r0, tof, **reading), chooser) for name, r0 in places.items()]
+
+    paper = {"handover": "on_ellipsoid", "final_thrust": "paper"}
+    return {
+        "bennu_700s": lambda: over_bennu(700.0, near_boundary(26, 8)),
+        "bennu_800s": lambda: over_bennu(800.0, near_boundary(14, 0)),
+        "bennu_900s": lambda: over_bennu(900.0, far_side(26)),
+        "bennu_on_ellipsoid": lambda: (
+            over_bennu(900.0, spread(5, 3), handover="on_ellipsoid")[:2]
+            + over_bennu(700.0, spread(5, 3), handover="on_ellipsoid")[2:]
+        ),
+        "bennu_paper_thrust": lambda: over_bennu(700.0, spread(5, 3), final_thrust="paper"),
+        "bennu_paper": lambda: over_bennu(900.0, spread(5, 3), **paper),
+        "bacchus": lambda: [(bacchus(900.0), near_boundary(12, 4)), (bacchus(1600.0), far_side(12))],
+        "eros": lambda: [(eros(2500.0), near_boundary(16, 8))],
+    }
+
+
+COLUMNS = [
+    "case", "facet", "r_c_x_m", "r_c_y_m", "r_c_z_m", "n_x", "n_y", "n_z", "tau", "tau_coarse", "tau_radau",
+    "tau_starts", "tau_ellipsoid_binds", "j_m2_s3", "j_coarse", "j_radau", "j_starts", "j_ellipsoid_binds",
+    "j_ellipsoid_margin", "j_peak_ratio", "reflight_position_m", "reflight_velocity_m_s",
+]  # fmt: skip
+
+
+def row_of(case: Case, facet: int, rng: np.random.Generator) -> dict[str, object]:
+    """Solve one facet in both modes and check it; empty cells where there is no answer."""
+    centroid, normal = case.shape.centroids[facet].round(6), case.shape.normals[facet].round(12)
+    problem = case.problem.at(centroid, normal)
+    row: dict[str, object] = dict.fromkeys(COLUMNS, "")
+    row |= {"case": case.name, "facet": facet}
+    row |= dict(zip(COLUMNS[2:8], [*problem.r_c, *problem.normal], strict=True))
+    least = best_over_starts(problem, INTERVALS, "tau", rng)
+    row["tau_starts"] = least.statuses
+    if least.best is None:
+        return row
+    row |= {"tau": f"{least.best.tau:.7f}", "tau_coarse": f"{least.coarse.tau:.7f}"}
+    row["tau_ellipsoid_binds"] = int(least.best.ellipsoid_force > BINDS)
+    row["tau_radau"] = checked(radau.solve(problem, INTERVALS, "tau", least.best), 1)
+    flown = refly(problem, least.best)
+    if least.best.tau < 1:
+        best = least_energy(problem, least.best, rng)
+        row["j_starts"] = best.statuses
+        if best.best is not None:
+            row |= {"j_m2_s3": f"{best.best.j:.9e}", "j_coarse": f"{best.coarse.j:.9e}"}
+            row["j_radau"] = checked(radau.solve(problem, INTERVALS, "j", best.best), 2)
+            row["j_ellipsoid_binds"] = int(best.best.ellipsoid_force > BINDS)
+            row["j_ellipsoid_margin"] = f"{best.best.margin:.3e}"
+            row["j_peak_ratio"] = f"{np.linalg.norm(best.best.u, axis=1).max():.5f}"
+            flown = refly(problem, best.best)
+    row["reflight_position_m"] = f"{flown['position_m']:.1e}"
+    row["reflight_velocity_m_s"] = f"{flown['velocity_m_s']:.1e}"
+    return row
+
+
+def least_energy(problem: Problem, least: Local, rng: np.random.Generator) -> Answer:
+    """Least J at full thrust, from the usual starts and from the path of least thrust level."""
+    return best_over_starts(problem, INTERVALS, "j", rng, extra={"tau": refine(least, INTERVALS)})
+
+
+def checked(answer: tuple[str, float, float], which: int) -> str:
+    """The second method's number, or nothing if it did not converge."""
+    if answer[0] not in ("Solve_Succeeded", "Solved_To_Acceptable_Level"):
+        return ""
+    return f"{answer[which]:.7f}" if which == 1 else f"{answer[which]:.9e}"
+
+
+def header(case: Case) -> str:
+    """One comment line with every physical input of the case, SI."""
+    inputs = asdict(replace(case.problem, r_c=(), normal=()))
+    del inputs["r_c"], inputs["normal"]
+    return "# " + json.dumps({"case": case.name, **inputs})
+
+
+def make(name: str) -> None:
+    """Write one table; rows appear as they are solved."""
+    cases = tables()[name]()
+    rng = np.random.default_rng(20221012)
+    rows = []
+    for case, chooser in cases:
+        begun = time.process_time()
+        facets = sorted(set(chooser(case, rng)))
+        rows += [row_of(case, facet, rng) for facet in facets]
+        print(
+            f"{name} {case.name}: {len(facets)} facets, {time.process_time() - begun:.0f} s CPU", flush=True
+        )
+    with (HERE / f"{name}.csv").open("w", newline="") as file:
+        file.writelines(header(case) + "\n" for case, _ in cases)
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+if __name__ == "__main__":
+    for wanted in sys.argv[1:] or list(tables()):
+        make(wanted)
