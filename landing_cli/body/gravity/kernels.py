@@ -29,9 +29,16 @@ from landing_cli.body.gravity.point_mass import (
     point_curvature,
     point_potential,
 )
+from landing_cli.body.gravity.polyhedron import (
+    polyhedron_acceleration,
+    polyhedron_acceleration_and_gradient,
+    polyhedron_curvature,
+    polyhedron_potential,
+)
 
 _POINT_MASS = int(GravityKind.POINT_MASS)
 _HARMONICS = int(GravityKind.HARMONICS)
+_DIPOLE = int(GravityKind.DIPOLE)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -41,7 +48,9 @@ def potential(kind: int, params: Params, x: float, y: float, z: float) -> float:
         return point_potential(params[0], x, y, z)
     if kind == _HARMONICS:
         return harmonics_potential(params, x, y, z)
-    return dipole_potential(params, x, y, z)
+    if kind == _DIPOLE:
+        return dipole_potential(params, x, y, z)
+    return polyhedron_potential(params, x, y, z)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -51,7 +60,9 @@ def acceleration(kind: int, params: Params, x: float, y: float, z: float) -> Vec
         return point_acceleration(params[0], x, y, z)
     if kind == _HARMONICS:
         return harmonics_acceleration(params, x, y, z)
-    return dipole_acceleration(params, x, y, z)
+    if kind == _DIPOLE:
+        return dipole_acceleration(params, x, y, z)
+    return polyhedron_acceleration(params, x, y, z)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -61,7 +72,9 @@ def acceleration_and_gradient(kind: int, params: Params, x: float, y: float, z: 
         return point_acceleration_and_gradient(params[0], x, y, z)
     if kind == _HARMONICS:
         return harmonics_acceleration_and_gradient(params, x, y, z)
-    return dipole_acceleration_and_gradient(params, x, y, z)
+    if kind == _DIPOLE:
+        return dipole_acceleration_and_gradient(params, x, y, z)
+    return polyhedron_acceleration_and_gradient(params, x, y, z)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -80,4 +93,6 @@ def curvature(
         return point_curvature(params[0], x, y, z, lx, ly, lz)
     if kind == _HARMONICS:
         return harmonics_curvature(params, x, y, z, lx, ly, lz)
-    return dipole_curvature(params, x, y, z, lx, ly, lz)
+    if kind == _DIPOLE:
+        return dipole_curvature(params, x, y, z, lx, ly, lz)
+    return polyhedron_curvature(params, x, y, z, lx, ly, lz)
