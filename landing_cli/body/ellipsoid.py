@@ -55,7 +55,7 @@ def _solve_few(squares: FloatArray) -> FloatArray:
     """Maximise sum log w subject to squares @ w <= 1 by a primal barrier and Newton's method."""
     weights = np.full(3, 0.5) / squares.sum(axis=1).max()
     barrier = 1.0
-    while barrier > 1e-15:
+    while barrier > 1e-12:
         for _ in range(60):
             slack = 1.0 - squares @ weights
             gradient = 1.0 / weights - barrier * squares.T @ (1.0 / slack)
