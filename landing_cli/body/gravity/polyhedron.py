@@ -97,7 +97,7 @@ def _from_point(params: Params, k: int, x: float, y: float, z: float) -> tuple[f
     return rx, ry, rz, math.sqrt(rx * rx + ry * ry + rz * rz)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _facet(
     params: Params, k: int, x: float, y: float, z: float
 ) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
