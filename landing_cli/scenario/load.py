@@ -9,7 +9,7 @@ number of values. Plain scalars follow the YAML 1.2 core schema: ``1e3`` is a nu
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,11 +53,14 @@ class LoadedScenario:
         The file that was read, as it is named to the user.
     beside : Path
         The folder where its shape is searched first.
+    places : mapping
+        "file:line" of every key that was written, by key path; for messages.
     """
 
     scenario: Scenario
     source: str
     beside: Path
+    places: Mapping[KeyPath, str]
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ def load(source: str, overrides: Sequence[str] = ()) -> LoadedScenario:
     for override in overrides:
         document = _with_override(document, override)
     scenario = from_tree(document.tree, document.places, found.name)
-    return LoadedScenario(scenario, found.name, found.beside)
+    return LoadedScenario(scenario, found.name, found.beside, document.places)
 
 
 def parse(text: str, name: str) -> Document:

@@ -5,21 +5,15 @@ from __future__ import annotations
 import difflib
 import importlib.resources
 import os
-import stat
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from landing_cli.errors import InputRefused
+from landing_cli.sources.guarded_file import open_regular
 
 MAX_BYTES = 1 << 20
 STDIN = "-"
-_KINDS = {
-    stat.S_IFDIR: "a folder",
-    stat.S_IFIFO: "a FIFO",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-}
 
 
 @dataclass(frozen=True)
@@ -121,20 +115,8 @@ def _exists(path: Path) -> bool:
 
 
 def _read_regular(path: Path) -> bytes:
-    # without O_NONBLOCK, opening a FIFO waits for a writer
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    try:
-        kind = stat.S_IFMT(os.fstat(descriptor).st_mode)
-        if kind != stat.S_IFREG:
-            raise InputRefused(
-                f"is {_KINDS.get(kind, 'no regular file')}",
-                where=str(path),
-                fix="name a scenario file, or pipe one in with -",
-            )
-        with open(descriptor, "rb", closefd=False) as file:
-            return file.read(MAX_BYTES + 1)
-    finally:
-        os.close(descriptor)
+    with open_regular(path, MAX_BYTES) as file:
+        return file.read(MAX_BYTES + 1)
 
 
 def _not_found(source: str, bare: bool) -> InputRefused:

@@ -56,7 +56,7 @@ def _section(section: BaseModel, indent: str) -> Iterator[str]:
 
 
 def _line(text: str, comment: str) -> str:
-    return f"{text:<{COMMENT_COLUMN}}# {comment}" if comment else text
+    return f"{text:<{COMMENT_COLUMN - 1}} # {comment}" if comment else text
 
 
 def _value(value: Any) -> str:

@@ -1,0 +1,67 @@
+"""Which commands there are: a mission or a group is one line in a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import typer
+
+from landing_cli import __version__
+from landing_cli.cli import reach, results, scenario
+from landing_cli.cli.options import new_program
+from landing_cli.errors import ExitCode, InputRefused
+
+# console script -> its commands
+MISSIONS: dict[str, typer.Typer] = {
+    "reach": reach.app,
+}
+# groups of the umbrella command beside the missions
+GROUPS: dict[str, typer.Typer] = {
+    "results": results.app,
+    "scenario": scenario.app,
+}
+# console scripts that are installed already, and what a later version will do with them
+LATER = {
+    "plan": "planning the flight to one landing site",
+    "tour": "searching for asteroids to visit on the way",
+}
+
+
+def run_command(program: str, arguments: Sequence[str]) -> int:
+    """Run one console script.
+
+    Parameters
+    ----------
+    program : str
+        Its name.
+    arguments : sequence of str
+        What follows it on the command line.
+
+    Returns
+    -------
+    int
+        Exit code; errors are raised.
+
+    Raises
+    ------
+    InputRefused
+        This version does not have the mission.
+    """
+    if program in LATER:
+        raise InputRefused(
+            f"landing {__version__} does not contain {LATER[program]}",
+            where=program,
+            fix="`reach` and `landing` are there: see `landing --help`",
+        )
+    app = umbrella() if program == "landing" else MISSIONS[program]
+    code: Any = app(args=list(arguments), prog_name=program, standalone_mode=False)
+    return code if isinstance(code, int) else ExitCode.OK
+
+
+def umbrella() -> typer.Typer:
+    """Make the ``landing`` command: every mission and every group."""
+    app = new_program("Where on an asteroid a spacecraft can land, and how it flies there.")
+    for name, group in {**MISSIONS, **GROUPS}.items():
+        app.add_typer(group, name=name)
+    return app

@@ -1,0 +1,112 @@
+"""``landing scenario``: start, look at, check and describe scenario files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from landing_cli.cli import console
+from landing_cli.cli.options import Force, Json, Output, Overrides, Quiet, ScenarioName, new_group
+from landing_cli.errors import OutputRefused
+
+app = new_group("Start, look at and check scenario files.")
+
+
+@app.command()
+def init(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the scenario.")],
+    shape: Annotated[
+        str,
+        typer.Option(
+            metavar="FILE", help="Shape file of the body: a path, or a name `landing shapes` lists."
+        ),
+    ],
+    length_unit: Annotated[str, typer.Option(metavar="km|m", help="Unit of the shape file.")] = "km",
+    density_kg_m3: Annotated[
+        float, typer.Option("--density", metavar="KG_M3", help="Density assumed for the body.")
+    ] = 2000.0,
+    rotation_period_h: Annotated[float, typer.Option("--period", metavar="H", help="Rotation period.")] = 6.0,
+    output: Output = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a commented scenario for any body: NAME.yaml, with numbers that fit the shape.
+
+    Start, thrust and times of flight follow from the body's size, the density and the period, so
+    that the file runs as it is; then replace them by your own.
+    """
+    from landing_cli.scenario.init import scenario_text
+
+    path = output or Path(f"{name}.yaml")
+    text = scenario_text(name, shape, length_unit, density_kg_m3, rotation_period_h, path.parent)
+    _write_new(path, text, force)
+    console.Console(quiet).say(f"wrote {path}; look it over, then: reach run {path}")
+
+
+@app.command()
+def show(
+    scenario: ScenarioName, overrides: Overrides = None, as_json: Json = False, quiet: Quiet = False
+) -> None:
+    """Print a scenario with every default, as YAML that can be read back."""
+    from landing_cli.scenario.load import load
+    from landing_cli.scenario.schema import to_tree
+    from landing_cli.scenario.show import to_yaml
+
+    loaded = load(scenario, overrides or ())
+    console.Console(quiet).say(f"read {loaded.source}")
+    if as_json:
+        console.print_json(to_tree(loaded.scenario))
+    else:
+        console.print_text(to_yaml(loaded.scenario))
+
+
+@app.command()
+def check(
+    scenario: ScenarioName, overrides: Overrides = None, as_json: Json = False, quiet: Quiet = False
+) -> None:
+    """Check a scenario and its shape, without solving anything."""
+    from landing_cli.scenario.build import build
+    from landing_cli.scenario.load import load
+
+    loaded = load(scenario, overrides or ())
+    console.Console(quiet).say(f"read {loaded.source}")
+    built = build(loaded)
+    facts = {
+        "scenario": loaded.scenario.name,
+        "facets": len(built.asteroid.mesh.faces),
+        "gm_m3_s2": built.asteroid.gm_m3_s2,
+        "rotation_rate_rad_s": built.asteroid.rotation_rate_rad_s,
+        "ellipsoid_m": [round(float(axis), 3) for axis in built.ellipsoid_m],
+        "cases": [name for name, _, _ in loaded.scenario.reach.cases()],
+        "shape_sha256": built.shape_sha256,
+    }
+    if as_json:
+        console.print_json(facts)
+    else:
+        console.print_table(["quantity", "value"], [[key, _plain(value)] for key, value in facts.items()])
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of scenario files, for editors."""
+    from landing_cli.scenario.schema import json_schema
+
+    console.print_json(json_schema())
+
+
+def _plain(value: object) -> object:
+    return ", ".join(map(str, value)) if isinstance(value, list) else value
+
+
+def _write_new(path: Path, text: str, force: bool) -> None:
+    """Write a file whole or not at all, and never over another one unasked."""
+    from landing_cli.sources.shape_files import write_whole
+
+    if path.exists() and not force:
+        raise OutputRefused("is there already", where=str(path), fix="take another name, or --force")
+    try:
+        write_whole(path, text.encode())
+    except OSError as error:
+        raise OutputRefused(f"cannot be written: {error.strerror}", where=str(path)) from None
