@@ -1,0 +1,1 @@
+"""The independent truth: scripts that make it, and tables that tests read."""
