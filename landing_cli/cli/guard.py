@@ -134,9 +134,10 @@ def _message_and_code(error: Exception) -> tuple[str, int]:
         return f"error: {where}{error.strerror}", ExitCode.REFUSED
     usage = getattr(error, "format_message", None)  # the command-line library's own errors
     if usage is not None:
-        context = getattr(error, "ctx", None)
-        path = context.command_path if context else "landing"
-        return f"error: {usage()}\nTry '{path} --help'.", ExitCode.USAGE
+        text, context = usage(), getattr(error, "ctx", None)
+        if text.startswith("Usage:") or context is None:  # a command group without a command shows its help
+            return text, ExitCode.USAGE
+        return f"error: {text}\nTry '{context.command_path} --help'.", ExitCode.USAGE
     if isinstance(error, MemoryError):
         return "error: out of memory; use fewer jobs, or a smaller shape", ExitCode.BUG
     text = " ".join(str(error).split())[:300]

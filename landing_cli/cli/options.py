@@ -14,7 +14,7 @@ EPILOG = "Every command takes --traceback (or LANDING_TRACEBACK=1): show where a
 STYLE: dict[str, Any] = {
     "no_args_is_help": True,
     "epilog": EPILOG,
-    "context_settings": {"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    "context_settings": {"help_option_names": ["-h", "--help"]},
     "rich_markup_mode": None,  # plain help comes in a third of the time
     "pretty_exceptions_enable": False,
 }

@@ -155,8 +155,10 @@ def _header(name: str, figures: BodyFigures, density_kg_m3: float) -> str:
     return f"""\
 {name}: a first scenario, written by `landing scenario init`; replace its numbers by your own.
 
-The body measures {extents} m; the least ellipsoid about it has the semi-axes {axes} m.
-{density_kg_m3:g} kg/m3 make GM = {figures.gm_m3_s2:.5g} m3/s2, and {figures.weight_m_s2:.2g} m/s2 at the surface.
+The body measures {extents} m; its least ellipsoid has the semi-axes
+{axes} m.
+{density_kg_m3:g} kg/m3 make GM = {figures.gm_m3_s2:.5g} m3/s2, and
+{figures.weight_m_s2:.2g} m/s2 at the surface.
 The spacecraft starts {START_HEIGHT_IN_RADII:g} mean radii above the ellipsoid, at rest in the rotating frame.
 Its thrust is at least {THRUST_OVER_WEIGHT:g} times its weight at the surface. The times of flight are
 {times} times the shortest crossing from rest to rest, 2 sqrt(distance mass / thrust).
