@@ -8,7 +8,7 @@ from typing import Any
 import typer
 
 from landing_cli import __version__
-from landing_cli.cli import reach, results, scenario
+from landing_cli.cli import reach, results, scenario, shapes
 from landing_cli.cli.options import new_program
 from landing_cli.errors import ExitCode, InputRefused
 
@@ -20,6 +20,7 @@ MISSIONS: dict[str, typer.Typer] = {
 GROUPS: dict[str, typer.Typer] = {
     "results": results.app,
     "scenario": scenario.app,
+    "shapes": shapes.app,
 }
 # console scripts that are installed already, and what a later version will do with them
 LATER = {
