@@ -7,6 +7,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+FloatArray: TypeAlias = NDArray[np.float64]
 Params: TypeAlias = NDArray[np.float64]
 Vector: TypeAlias = tuple[float, float, float]
 Symmetric: TypeAlias = tuple[float, float, float, float, float, float]

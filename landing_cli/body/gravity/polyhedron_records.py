@@ -100,3 +100,22 @@ def _edge_records(corners: FloatArray, normals: FloatArray, neighbours: IntArray
     tensor = 0.5 * (tensor + tensor.transpose(0, 2, 1))
     row, column = np.array([[0, 0], [1, 1], [2, 2], [0, 1], [0, 2], [1, 2]]).T
     return np.column_stack([length, tensor[:, row, column]])
+
+
+def recorded_corners(params: FloatArray) -> FloatArray:
+    """Return the corners that a polyhedron's packed parameters hold.
+
+    Parameters
+    ----------
+    params : (p,) float
+        Of a polyhedron field.
+
+    Returns
+    -------
+    (m, 3) float, m
+        One row for each corner of each facet.
+    """
+    twos, ones = int(params[0]), int(params[1])
+    split = 3 + 27 * twos
+    two, one = params[3:split].reshape(twos, 27), params[split:].reshape(ones, 20)
+    return np.concatenate([two[:, :9].reshape(-1, 3), one[:, :9].reshape(-1, 3)])
