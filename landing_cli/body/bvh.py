@@ -33,8 +33,9 @@ class SurfaceIndex(NamedTuple):
 
     Attributes
     ----------
-    boxes : (2^(depth + 1), 6) float, m
-        Least and greatest x, y, z of every node in heap order; row 0 is unused.
+    boxes : (2^(depth + 1), 15) float
+        Oriented box of every node in heap order: three axes, the least and the greatest coordinate along them
+        (m); row 0 is unused.
     triangles : (m, 12) float
         Corners a, b, c (m) and the outward unit normal of the facet in each slot.
     pseudonormals : (m, 7, 3) float
@@ -81,30 +82,37 @@ def build_surface_index(mesh: Mesh) -> SurfaceIndex:
 
 def _leaf_order(centroids: FloatArray, depth: int) -> IntArray:
     """Halve the facets at the median along the longer side of each node, level by level."""
-    count = len(centroids)
-    order = np.arange(count)
+    order = np.arange(len(centroids))
     for level in range(depth):
-        starts = (np.arange(2**level + 1) * count) >> level
-        node = np.repeat(np.arange(2**level), np.diff(starts))
+        starts, node = _slots_of(level, len(centroids))
         placed = centroids[order]
-        extent = np.maximum.reduceat(placed, starts[:-1]) - np.minimum.reduceat(placed, starts[:-1])
-        along = placed[np.arange(count), np.argmax(extent, axis=1)[node]]
+        extent = np.maximum.reduceat(placed, starts) - np.minimum.reduceat(placed, starts)
+        along = placed[np.arange(len(order)), np.argmax(extent, axis=1)[node]]
         order = order[np.lexsort((along, node))]
     return order
 
 
+def _slots_of(level: int, count: int) -> tuple[IntArray, IntArray]:
+    """First slot of each node of a level, and the node (within its level) of each slot."""
+    bounds = (np.arange(2**level + 1) * count) >> level
+    return bounds[:-1], np.repeat(np.arange(2**level), np.diff(bounds))
+
+
 def _node_boxes(corners: FloatArray, depth: int) -> FloatArray:
-    """Boxes of the leaves from their facets, then of each parent from its two children."""
-    leaves = 2**depth
-    starts = (np.arange(leaves) * len(corners)) >> depth
-    boxes = np.zeros((2 * leaves, 6))
-    boxes[leaves:, :3] = np.minimum.reduceat(corners.min(axis=1), starts)
-    boxes[leaves:, 3:] = np.maximum.reduceat(corners.max(axis=1), starts)
-    for level in range(depth - 1, -1, -1):
-        first = 2**level
-        children = boxes[2 * first : 4 * first].reshape(first, 2, 6)
-        boxes[first : 2 * first, :3] = children[:, :, :3].min(axis=1)
-        boxes[first : 2 * first, 3:] = children[:, :, 3:].max(axis=1)
+    """Boxes along the principal axes of each node's corners: thin across the surface, so they prune well."""
+    boxes = np.zeros((2 ** (depth + 1), 15))
+    first = corners.sum(axis=1)
+    second = np.swapaxes(corners, 1, 2) @ corners
+    for level in range(depth + 1):
+        starts, node = _slots_of(level, len(corners))
+        total, weight = np.add.reduceat(first, starts), 3.0 * np.bincount(node)[:, None, None]
+        spread = np.add.reduceat(second, starts) - total[:, :, None] * total[:, None, :] / weight
+        axes = np.linalg.eigh(spread)[1]
+        a, b, c = np.moveaxis(corners @ axes[node], 1, 0)
+        rows = boxes[2**level : 2 ** (level + 1)]
+        rows[:, :9] = np.swapaxes(axes, 1, 2).reshape(-1, 9)
+        rows[:, 9:12] = np.minimum.reduceat(np.minimum(np.minimum(a, b), c), starts)
+        rows[:, 12:] = np.maximum.reduceat(np.maximum(np.maximum(a, b), c), starts)
     return boxes
 
 
@@ -132,10 +140,14 @@ def _pseudonormals(mesh: Mesh, normals: FloatArray) -> FloatArray:
 @njit(cache=True, nogil=True, error_model="numpy")
 def box_distance2(boxes: FloatArray, node: int, x: float, y: float, z: float) -> float:
     """Squared distance from a point to the box of a node, m2."""
-    dx = max(max(boxes[node, 0] - x, x - boxes[node, 3]), 0.0)
-    dy = max(max(boxes[node, 1] - y, y - boxes[node, 4]), 0.0)
-    dz = max(max(boxes[node, 2] - z, z - boxes[node, 5]), 0.0)
-    return dx * dx + dy * dy + dz * dz
+    b = boxes[node]
+    u = b[0] * x + b[1] * y + b[2] * z
+    v = b[3] * x + b[4] * y + b[5] * z
+    w = b[6] * x + b[7] * y + b[8] * z
+    du = max(max(b[9] - u, u - b[12]), 0.0)
+    dv = max(max(b[10] - v, v - b[13]), 0.0)
+    dw = max(max(b[11] - w, w - b[14]), 0.0)
+    return du * du + dv * dv + dw * dw
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
