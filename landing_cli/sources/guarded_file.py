@@ -47,15 +47,20 @@ def open_regular(path: Path, cap_bytes: int) -> Iterator[io.FileIO]:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputRefused(f"cannot be read: {reason}", where=str(path)) from error
-    with open(descriptor, "rb", buffering=0) as raw:  # noqa: PTH123 (a descriptor, not a path)
-        status = os.fstat(descriptor)
-        kind = stat.S_IFMT(status.st_mode)
-        if kind != stat.S_IFREG:
-            found = _KINDS.get(kind, "no regular file")
-            raise InputRefused(f"is {found}", where=str(path), fix="name a regular file")
-        if status.st_size > cap_bytes:
-            raise InputRefused(
-                f"has {status.st_size / 2**20:.0f} MiB; at most {cap_bytes / 2**20:.0f} MiB are read",
-                where=str(path),
-            )
-        yield raw
+    try:
+        _refuse_unfit(path, os.fstat(descriptor), cap_bytes)
+        yield io.FileIO(descriptor, closefd=False)
+    finally:
+        os.close(descriptor)
+
+
+def _refuse_unfit(path: Path, status: os.stat_result, cap_bytes: int) -> None:
+    kind = stat.S_IFMT(status.st_mode)
+    if kind != stat.S_IFREG:
+        found = _KINDS.get(kind, "no regular file")
+        raise InputRefused(f"is {found}", where=str(path), fix="name a regular file")
+    if status.st_size > cap_bytes:
+        raise InputRefused(
+            f"has {status.st_size / 2**20:.0f} MiB; at most {cap_bytes / 2**20:.0f} MiB are read",
+            where=str(path),
+        )
