@@ -173,8 +173,11 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     yield address
     for process in reversed(started):
         process.terminate()
-    for process in started:
-        process.wait(timeout=20)
+        try:
+            process.wait(timeout=5)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
 
 
 def test_dask_gives_the_same_answers(cluster: str):

@@ -119,7 +119,7 @@ def _preflight(client: Any, scheduler: str) -> None:
                 f"worker {worker} lacks a package: {error}", where=where, fix=install
             ) from error
         except Exception as error:
-            told = f"worker {worker} failed a first task: {error or type(error).__name__}"
+            told = f"worker {worker} failed a first task: {str(error) or type(error).__name__}"
             raise InputRefused(told, where=where, fix=install) from error
         differences = [f"{k} {theirs.get(k)} (here {v})" for k, v in ours.items() if theirs.get(k) != v]
         if differences:
