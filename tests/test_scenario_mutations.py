@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 from scenario_samples import SHIPPED
 
-from landing_cli.cli.app import main
+from landing_cli.cli.guard import told
+from landing_cli.cli.scenario import check
 from landing_cli.errors import ExitCode
 from landing_cli.scenario.load import parse
 
@@ -94,6 +95,12 @@ def as_yaml(tree: Any) -> str:
     return json.dumps(tree, indent=1).replace('"@', "").replace('@"', "")
 
 
+def checked(_: Sequence[str]) -> int:
+    """What `landing scenario check damaged.yaml --quiet` does once its arguments are parsed."""
+    check("damaged.yaml", quiet=True)
+    return ExitCode.OK
+
+
 @pytest.mark.parametrize("source", SHIPPED, ids=lambda path: path.stem)
 def test_every_damaged_leaf_is_refused_by_its_key(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
@@ -105,7 +112,7 @@ def test_every_damaged_leaf_is_refused_by_its_key(
     for path, value in leaves(tree):
         for kind, change in mutations(path, value):
             file.write_text(as_yaml(mutated(tree, path, change)))
-            code = main("landing", ["scenario", "check", "damaged.yaml", "--quiet"])
+            code = told(checked, [])
             out, err = capsys.readouterr()
             # what is wrong with a list's element may be told at the list
             key = ".".join(map(str, path[:-1] if isinstance(path[-1], int) else path))
