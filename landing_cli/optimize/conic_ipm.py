@@ -1,0 +1,469 @@
+"""Interior-point steps for a descent with a bounded, piecewise-constant thrust.
+
+The problem, linearised at the current point by the caller at every iteration (see ``Model``):
+
+    minimise    f(F, y)
+    subject to  c(F, y)  = 0                     n_equal rows
+                c(F, y) >= 0                     the other rows, with slacks
+                (y0, F_k) in Q                   thrust bound at node k = 0..N-1
+                A_j y + b_j = s_j in Q           further cones on y alone, with their own slacks
+
+F_k in R^3 is the thrust of interval k, y in R^7 the thrust level y0 = tau followed by the two ends
+of the final stage's acceleration, and Q the second-order cone of R^4. Mehrotra's
+predictor-corrector with Nesterov-Todd scaling: each node is eliminated by itself
+(H_k = a I + 2/beta^2 w1 w1' inverts by Sherman-Morrison), which leaves one dense system in the
+row multipliers and one of order 7 in y. Signs follow the Lagrangian
+
+    L = f + lambda' c - sum_k z_k' (y0, F_k) - sum_j z_j' (A_j y + b_j) - lambda_in' s,
+
+so that an inequality row has lambda = -eta with eta >= 0 complementary to its slack s.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from landing_cli.optimize.second_order_cone import (
+    UNBOUNDED,
+    apply_inverse_scaling_squared,
+    complementarity_shift,
+    longest_step,
+    scaling_point,
+)
+from landing_cli.optimize.small_dense import cholesky, cholesky_solve
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+Y_SIZE = 7
+FRACTION_TO_BOUNDARY = 0.98
+
+
+class Point(NamedTuple):
+    """The primal-dual iterate (N intervals, J cones, R rows; scaled units)."""
+
+    thrust: Floats  # (N, 3)
+    node_dual: Floats  # (N, 4)
+    y: Floats  # (7,) thrust level, acceleration at touchdown, acceleration at handover
+    cone_slack: Floats  # (J, 4)
+    cone_dual: Floats  # (J, 4)
+    multiplier: Floats  # (R,)
+    slack: Floats  # (R,) of the inequality rows
+
+
+class Model(NamedTuple):
+    """The problem linearised at a point."""
+
+    row_value: Floats  # (R,) c(F, y); for inequality rows before the slack is taken off
+    row_thrust: Floats  # (R, N, 3) derivative with respect to the thrust nodes
+    row_y: Floats  # (R, 7) derivative with respect to y
+    row_end: Ints  # (R,) the row depends on the first row_end intervals only
+    cone_map: Floats  # (J, 4, 7)
+    cone_offset: Floats  # (J, 4)
+    thrust_gradient: Floats  # (N, 3) of the Lagrangian's smooth part without row_thrust' lambda
+    thrust_curvature: Floats  # (N,) isotropic Hessian
+    y_gradient: Floats  # (7,)
+    y_hessian: Floats  # (7, 7)
+
+
+class Step(NamedTuple):
+    """Residuals, scalings, factors and the direction of one iteration."""
+
+    node_residual: Floats  # (N, 3)
+    y_residual: Floats  # (7,)
+    row_residual: Floats  # (R,)
+    node_scaling: Floats  # (N, 5) w, 1/beta^2
+    node_inverse: Floats  # (N, 3) 1/a, Sherman-Morrison factor f, coupling to tau
+    node_shift: Floats  # (N, 4)
+    cone_residual: Floats  # (J, 4)
+    cone_scaling: Floats  # (J, 5)
+    cone_shift: Floats  # (J, 4)
+    schur: Floats  # (R, R) row_thrust H^-1 row_thrust' and its factor
+    coupling: Floats  # (R, 7)
+    solved_coupling: Floats  # (R, 7) schur^-1 coupling
+    reduced: Floats  # (7, 7)
+    row_shift: Floats  # (R,) constant part of an inequality row's slack step
+    rhs_rows: Floats  # (R,)
+    rhs_y: Floats  # (7,)
+    d_thrust: Floats  # (N, 3)
+    d_node_dual: Floats  # (N, 4)
+    d_y: Floats  # (7,)
+    d_cone_slack: Floats  # (J, 4)
+    d_cone_dual: Floats  # (J, 4)
+    d_multiplier: Floats  # (R,)
+    d_slack: Floats  # (R,)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def new_point(n_nodes, n_cones, n_rows):
+    """Return a zeroed iterate."""
+    return Point(
+        np.zeros((n_nodes, 3)),
+        np.zeros((n_nodes, 4)),
+        np.zeros(Y_SIZE),
+        np.zeros((n_cones, 4)),
+        np.zeros((n_cones, 4)),
+        np.zeros(n_rows),
+        np.zeros(n_rows),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def new_model(n_nodes, n_cones, n_rows):
+    """Return a zeroed model."""
+    return Model(
+        np.zeros(n_rows),
+        np.zeros((n_rows, n_nodes, 3)),
+        np.zeros((n_rows, Y_SIZE)),
+        np.zeros(n_rows, dtype=np.int64),
+        np.zeros((n_cones, 4, Y_SIZE)),
+        np.zeros((n_cones, 4)),
+        np.zeros((n_nodes, 3)),
+        np.zeros(n_nodes),
+        np.zeros(Y_SIZE),
+        np.zeros((Y_SIZE, Y_SIZE)),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def new_step(n_nodes, n_cones, n_rows):
+    """Return zeroed scratch space for an iteration."""
+    return Step(
+        np.zeros((n_nodes, 3)),
+        np.zeros(Y_SIZE),
+        np.zeros(n_rows),
+        np.zeros((n_nodes, 5)),
+        np.zeros((n_nodes, 3)),
+        np.zeros((n_nodes, 4)),
+        np.zeros((n_cones, 4)),
+        np.zeros((n_cones, 5)),
+        np.zeros((n_cones, 4)),
+        np.zeros((n_rows, n_rows)),
+        np.zeros((n_rows, Y_SIZE)),
+        np.zeros((n_rows, Y_SIZE)),
+        np.zeros((Y_SIZE, Y_SIZE)),
+        np.zeros(n_rows),
+        np.zeros(n_rows),
+        np.zeros(Y_SIZE),
+        np.zeros((n_nodes, 3)),
+        np.zeros((n_nodes, 4)),
+        np.zeros(Y_SIZE),
+        np.zeros((n_cones, 4)),
+        np.zeros((n_cones, 4)),
+        np.zeros(n_rows),
+        np.zeros(n_rows),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def residuals(point, model, step, n_equal, n_rows, n_cones, tau_free):
+    """Fill the residuals of the optimality conditions.
+
+    Returns
+    -------
+    primal : float
+        Largest residual of rows and cones.
+    dual : float
+        Largest stationarity residual, per unit of time at the nodes.
+    gap : float
+        Sum of the complementarity products.
+    """
+    n_nodes = point.thrust.shape[0]
+    tau = point.y[0]
+    gap = primal = 0.0
+    for a in range(Y_SIZE):
+        total = model.y_gradient[a]
+        for i in range(n_rows):
+            total += model.row_y[i, a] * point.multiplier[i]
+        step.y_residual[a] = total
+    for j in range(n_cones):
+        for i in range(4):
+            total = model.cone_offset[j, i]
+            for a in range(Y_SIZE):
+                total += model.cone_map[j, i, a] * point.y[a]
+                step.y_residual[a] -= model.cone_map[j, i, a] * point.cone_dual[j, i]
+            step.cone_residual[j, i] = total - point.cone_slack[j, i]
+            primal = max(primal, abs(step.cone_residual[j, i]))
+            gap += point.cone_slack[j, i] * point.cone_dual[j, i]
+    dual = 0.0
+    for k in range(n_nodes):
+        for i in range(3):
+            step.node_residual[k, i] = model.thrust_gradient[k, i] - point.node_dual[k, 1 + i]
+            gap += point.thrust[k, i] * point.node_dual[k, 1 + i]
+        gap += tau * point.node_dual[k, 0]
+        step.y_residual[0] -= point.node_dual[k, 0]
+    for r in range(n_rows):
+        multiplier = point.multiplier[r]
+        for k in range(model.row_end[r]):
+            for i in range(3):
+                step.node_residual[k, i] += multiplier * model.row_thrust[r, k, i]
+    for k in range(n_nodes):
+        for i in range(3):
+            dual = max(dual, abs(step.node_residual[k, i]) * n_nodes)
+    if not tau_free:
+        step.y_residual[0] = 0.0
+    for a in range(Y_SIZE):
+        dual = max(dual, abs(step.y_residual[a]))
+    for r in range(n_rows):
+        step.row_residual[r] = model.row_value[r]
+        if r >= n_equal:
+            step.row_residual[r] -= point.slack[r]
+            gap -= point.slack[r] * point.multiplier[r]
+        primal = max(primal, abs(step.row_residual[r]))
+    return primal, dual, gap
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _scale_cones(point, model, step, n_cones):
+    """Scale the cones on y and start the order-7 system with their Hessians."""
+    reduced = step.reduced
+    for a in range(Y_SIZE):
+        for b in range(Y_SIZE):
+            reduced[a, b] = model.y_hessian[a, b]
+    for j in range(n_cones):
+        s, z, w = point.cone_slack[j], point.cone_dual[j], step.cone_scaling[j]
+        w[0], w[1], w[2], w[3], w[4] = scaling_point(s[0], s[1], s[2], s[3], z[0], z[1], z[2], z[3])
+        for b in range(Y_SIZE):
+            A = model.cone_map[j]
+            g0, g1, g2, g3 = apply_inverse_scaling_squared(
+                w[0], w[1], w[2], w[3], w[4], A[0, b], A[1, b], A[2, b], A[3, b]
+            )
+            for a in range(b, Y_SIZE):
+                reduced[a, b] += A[0, a] * g0 + A[1, a] * g1 + A[2, a] * g2 + A[3, a] * g3
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _eliminate_nodes(point, model, step, n_rows):
+    """Scale every node's cone and add its share of the Schur complement."""
+    schur, coupling = step.schur, step.coupling
+    tau = point.y[0]
+    for k in range(point.thrust.shape[0]):
+        F, z = point.thrust[k], point.node_dual[k]
+        w0, w1, w2, w3, ib = scaling_point(tau, F[0], F[1], F[2], z[0], z[1], z[2], z[3])
+        w = step.node_scaling[k]
+        w[0], w[1], w[2], w[3], w[4] = w0, w1, w2, w3, ib
+        norm2 = w1 * w1 + w2 * w2 + w3 * w3
+        diagonal = model.thrust_curvature[k] + ib
+        inverse = 1.0 / diagonal
+        f = 2.0 * ib / (diagonal + 2.0 * ib * norm2)
+        # column of tau in the node's block: h = -2 w0 w1 / beta^2, and H^-1 h = g w1
+        h = -2.0 * ib * w0
+        g = inverse * (1.0 - f * norm2) * h
+        step.node_inverse[k, 0], step.node_inverse[k, 1], step.node_inverse[k, 2] = inverse, f, h
+        step.reduced[0, 0] += ib * (2.0 * w0 * w0 - 1.0) - h * g * norm2
+        for i in range(n_rows):
+            if model.row_end[i] <= k:
+                continue
+            S = model.row_thrust[i, k]
+            a0, a1, a2 = S[0], S[1], S[2]
+            along = w1 * a0 + w2 * a1 + w3 * a2
+            coupling[i, 0] -= g * along
+            t = f * along
+            b0, b1, b2 = inverse * (a0 - t * w1), inverse * (a1 - t * w2), inverse * (a2 - t * w3)
+            for j in range(i + 1):
+                if model.row_end[j] > k:
+                    T = model.row_thrust[j, k]
+                    schur[i, j] += b0 * T[0] + b1 * T[1] + b2 * T[2]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def factorise(point, model, step, n_equal, n_rows, n_cones, tau_free):
+    """Scale all cones, eliminate the nodes, and factor the two dense systems."""
+    schur, coupling, solved = step.schur, step.coupling, step.solved_coupling
+    _scale_cones(point, model, step, n_cones)
+    for i in range(n_rows):
+        for j in range(i + 1):
+            schur[i, j] = 0.0
+        for a in range(Y_SIZE):
+            coupling[i, a] = model.row_y[i, a]
+    _eliminate_nodes(point, model, step, n_rows)
+    for r in range(n_equal, n_rows):
+        schur[r, r] -= point.slack[r] / point.multiplier[r]
+    if not tau_free:
+        for a in range(1, Y_SIZE):
+            step.reduced[a, 0] = 0.0
+        step.reduced[0, 0] = 1.0
+        for i in range(n_rows):
+            coupling[i, 0] = 0.0
+    cholesky(schur, n_rows)
+    for a in range(Y_SIZE):
+        for i in range(n_rows):
+            step.rhs_rows[i] = coupling[i, a]
+        cholesky_solve(schur, n_rows, step.rhs_rows)
+        for i in range(n_rows):
+            solved[i, a] = step.rhs_rows[i]
+    for a in range(Y_SIZE):
+        for b in range(a + 1):
+            total = step.reduced[a, b]
+            for i in range(n_rows):
+                total += coupling[i, a] * solved[i, b]
+            step.reduced[a, b] = total
+    cholesky(step.reduced, Y_SIZE)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _right_hand_side(point, model, step, n_equal, n_rows, n_cones, target, corrector, tau_free):
+    """Fill the right-hand sides; d_thrust holds H^-1 q of each node on return."""
+    for a in range(Y_SIZE):
+        step.rhs_y[a] = -step.y_residual[a]
+    for i in range(n_rows):
+        step.rhs_rows[i] = -step.row_residual[i]
+    for j in range(n_cones):
+        w, o, A = step.cone_scaling[j], step.cone_shift[j], model.cone_map[j]
+        o[0], o[1], o[2], o[3] = complementarity_shift(
+            w, w[4], point.cone_dual[j], step.d_cone_slack[j], step.d_cone_dual[j], target, corrector
+        )
+        e = step.cone_residual[j]
+        g0, g1, g2, g3 = apply_inverse_scaling_squared(w[0], w[1], w[2], w[3], w[4], e[0], e[1], e[2], e[3])
+        g0, g1, g2, g3 = o[0] - g0, o[1] - g1, o[2] - g2, o[3] - g3
+        for a in range(Y_SIZE):
+            step.rhs_y[a] += A[0, a] * g0 + A[1, a] * g1 + A[2, a] * g2 + A[3, a] * g3
+    for r in range(n_equal, n_rows):
+        eta = -point.multiplier[r]
+        product = target - point.slack[r] * eta
+        if corrector:
+            product += step.d_slack[r] * step.d_multiplier[r]
+        step.row_shift[r] = product / eta
+        step.rhs_rows[r] += step.row_shift[r]
+    d_tau = step.d_y[0]
+    for k in range(point.thrust.shape[0]):
+        w, o, d = step.node_scaling[k], step.node_shift[k], step.d_thrust[k]
+        o[0], o[1], o[2], o[3] = complementarity_shift(
+            w, w[4], point.node_dual[k], (d_tau, d[0], d[1], d[2]), step.d_node_dual[k], target, corrector
+        )
+        inverse, f, h = step.node_inverse[k, 0], step.node_inverse[k, 1], step.node_inverse[k, 2]
+        q0 = o[1] - step.node_residual[k, 0]
+        q1 = o[2] - step.node_residual[k, 1]
+        q2 = o[3] - step.node_residual[k, 2]
+        t = f * (w[1] * q0 + w[2] * q1 + w[3] * q2)
+        d[0], d[1], d[2] = inverse * (q0 - t * w[1]), inverse * (q1 - t * w[2]), inverse * (q2 - t * w[3])
+        step.rhs_y[0] += o[0] - h * (w[1] * d[0] + w[2] * d[1] + w[3] * d[2])
+    for r in range(n_rows):
+        total = 0.0
+        for k in range(model.row_end[r]):
+            S, d = model.row_thrust[r, k], step.d_thrust[k]
+            total += S[0] * d[0] + S[1] * d[1] + S[2] * d[2]
+        step.rhs_rows[r] -= total
+    if not tau_free:
+        step.rhs_y[0] = 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _solve_dense(step, n_rows):
+    """Solve B dy - M dlambda = rhs_rows and H dy + B' dlambda = rhs_y."""
+    cholesky_solve(step.schur, n_rows, step.rhs_rows)
+    for a in range(Y_SIZE):
+        total = step.rhs_y[a]
+        for i in range(n_rows):
+            total += step.coupling[i, a] * step.rhs_rows[i]
+        step.d_y[a] = total
+    cholesky_solve(step.reduced, Y_SIZE, step.d_y)
+    for i in range(n_rows):
+        total = -step.rhs_rows[i]
+        for a in range(Y_SIZE):
+            total += step.solved_coupling[i, a] * step.d_y[a]
+        step.d_multiplier[i] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _recover_cones(point, model, step, n_equal, n_rows, n_cones):
+    """Directions of the cones on y and of the inequality rows; the longest step they allow."""
+    longest = UNBOUNDED
+    for j in range(n_cones):
+        w, o, A = step.cone_scaling[j], step.cone_shift[j], model.cone_map[j]
+        ds, dz = step.d_cone_slack[j], step.d_cone_dual[j]
+        for i in range(4):
+            total = step.cone_residual[j, i]
+            for a in range(Y_SIZE):
+                total += A[i, a] * step.d_y[a]
+            ds[i] = total
+        g0, g1, g2, g3 = apply_inverse_scaling_squared(
+            w[0], w[1], w[2], w[3], w[4], ds[0], ds[1], ds[2], ds[3]
+        )
+        dz[0], dz[1], dz[2], dz[3] = o[0] - g0, o[1] - g1, o[2] - g2, o[3] - g3
+        s, z = point.cone_slack[j], point.cone_dual[j]
+        longest = min(longest, longest_step(s[0], s[1], s[2], s[3], ds[0], ds[1], ds[2], ds[3]))
+        longest = min(longest, longest_step(z[0], z[1], z[2], z[3], dz[0], dz[1], dz[2], dz[3]))
+    for r in range(n_equal, n_rows):
+        s, eta, d_eta = point.slack[r], -point.multiplier[r], -step.d_multiplier[r]
+        step.d_slack[r] = step.row_shift[r] - s / eta * d_eta
+        if d_eta < 0.0:
+            longest = min(longest, -eta / d_eta)
+        if step.d_slack[r] < 0.0:
+            longest = min(longest, -s / step.d_slack[r])
+    return longest
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _recover_nodes(point, model, step, n_rows):
+    """Directions of the thrust nodes and their duals; the longest step they allow."""
+    longest = UNBOUNDED
+    tau, d_tau = point.y[0], step.d_y[0]
+    for k in range(point.thrust.shape[0]):
+        w, o, d, dz = step.node_scaling[k], step.node_shift[k], step.d_thrust[k], step.d_node_dual[k]
+        inverse, f, h = step.node_inverse[k, 0], step.node_inverse[k, 1], step.node_inverse[k, 2]
+        v0, v1, v2 = h * d_tau * w[1], h * d_tau * w[2], h * d_tau * w[3]
+        for r in range(n_rows):
+            if model.row_end[r] > k:
+                S = model.row_thrust[r, k]
+                v0 += step.d_multiplier[r] * S[0]
+                v1 += step.d_multiplier[r] * S[1]
+                v2 += step.d_multiplier[r] * S[2]
+        t = f * (w[1] * v0 + w[2] * v1 + w[3] * v2)
+        d[0] -= inverse * (v0 - t * w[1])
+        d[1] -= inverse * (v1 - t * w[2])
+        d[2] -= inverse * (v2 - t * w[3])
+        g0, g1, g2, g3 = apply_inverse_scaling_squared(w[0], w[1], w[2], w[3], w[4], d_tau, d[0], d[1], d[2])
+        dz[0], dz[1], dz[2], dz[3] = o[0] - g0, o[1] - g1, o[2] - g2, o[3] - g3
+        F, z = point.thrust[k], point.node_dual[k]
+        longest = min(longest, longest_step(tau, F[0], F[1], F[2], d_tau, d[0], d[1], d[2]))
+        longest = min(longest, longest_step(z[0], z[1], z[2], z[3], dz[0], dz[1], dz[2], dz[3]))
+    return longest
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _direction(point, model, step, n_equal, n_rows, n_cones, target, corrector, tau_free):
+    """Solve the Newton system for one right-hand side; return the longest feasible step."""
+    _right_hand_side(point, model, step, n_equal, n_rows, n_cones, target, corrector, tau_free)
+    _solve_dense(step, n_rows)
+    return min(
+        _recover_cones(point, model, step, n_equal, n_rows, n_cones),
+        _recover_nodes(point, model, step, n_rows),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def advance(point, model, step, n_equal, n_rows, n_cones, gap, smallest_target, tau_free):
+    """One predictor-corrector step, in place, from the residuals of :func:`residuals`.
+
+    Returns
+    -------
+    length : float
+        Step length taken.
+    """
+    degree = point.thrust.shape[0] + n_cones + n_rows - n_equal
+    factorise(point, model, step, n_equal, n_rows, n_cones, tau_free)
+    affine = min(1.0, _direction(point, model, step, n_equal, n_rows, n_cones, 0.0, False, tau_free))
+    target = max((1.0 - affine) ** 3 * gap / degree, smallest_target)
+    longest = _direction(point, model, step, n_equal, n_rows, n_cones, target, True, tau_free)
+    length = min(1.0, FRACTION_TO_BOUNDARY * longest)
+    for a in range(Y_SIZE):
+        point.y[a] += length * step.d_y[a]
+    for j in range(n_cones):
+        for i in range(4):
+            point.cone_slack[j, i] += length * step.d_cone_slack[j, i]
+            point.cone_dual[j, i] += length * step.d_cone_dual[j, i]
+    for r in range(n_rows):
+        point.multiplier[r] += length * step.d_multiplier[r]
+        if r >= n_equal:
+            point.slack[r] += length * step.d_slack[r]
+    for k in range(point.thrust.shape[0]):
+        for i in range(3):
+            point.thrust[k, i] += length * step.d_thrust[k, i]
+        for i in range(4):
+            point.node_dual[k, i] += length * step.d_node_dual[k, i]
+    return length

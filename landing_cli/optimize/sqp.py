@@ -1,0 +1,176 @@
+"""Trust-region SQP with an exact L1 penalty, in pieces that a caller's loop strings together.
+
+    minimise  f(x)  subject to  c_i(x) = 0 (equality rows),  c_i(x) >= 0 (the others)
+
+The merit function is f + price * (sum of violations), where rows of the pool count only by the worst of
+them: rows that come and go along a path, such as local minima, leave the merit continuous. Each round the caller fills a ``LocalModel``;
+``propose`` solves the elastic quadratic program within the trust region, which always has a solution, and
+tells how much it expects the merit to fall. Nothing expected and nothing violated: a local optimum. Nothing
+expected at a high price, and still violated: a local minimum of the violation. Everything else is not
+converged, and says nothing about feasibility.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from landing_cli.optimize.elastic_qp import ElasticQP, new_elastic_qp, solve_elastic_qp
+
+Floats = NDArray[np.float64]
+
+# Curvature is floored at this fraction of the largest, so that the quadratic program is strictly convex.
+FLAT = 1e-8
+
+
+class LocalModel(NamedTuple):
+    """The problem at the current point; n unknowns, room for m rows."""
+
+    gradient: Floats  # (n,) of f
+    hessian: Floats  # (n, n) of the Lagrangian, or an estimate
+    jacobian: Floats  # (m, n)
+    values: Floats  # (m,)
+    equality: NDArray[np.bool_]  # (m,)
+    pooled: NDArray[np.bool_]  # (m,) no equality; their violation is that of the worst of them
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def new_local_model(n: int, m: int) -> LocalModel:
+    """A zeroed model."""
+    return LocalModel(
+        np.zeros(n),
+        np.zeros((n, n)),
+        np.zeros((m, n)),
+        np.zeros(m),
+        np.zeros(m, dtype=np.bool_),
+        np.zeros(m, dtype=np.bool_),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def violation(values: Floats, equality: NDArray[np.bool_], pooled: NDArray[np.bool_], m: int) -> float:
+    """Violation of the first ``m`` rows: the sum of the rows' own, and the worst of the pool."""
+    total, worst = 0.0, 0.0
+    for i in range(m):
+        if equality[i]:
+            total += abs(values[i])
+        elif pooled[i]:
+            worst = max(worst, -values[i])
+        else:
+            total += max(0.0, -values[i])
+    return total + worst
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def convexify(hessian: Floats) -> None:
+    """Turn negative curvature into positive curvature of the same size, in place."""
+    n = hessian.shape[0]
+    values, vectors = np.linalg.eigh(hessian)
+    largest = max(abs(values[0]), abs(values[n - 1]), 1e-12)
+    if values[0] >= FLAT * largest:
+        return
+    for a in range(n):
+        for b in range(n):
+            total = 0.0
+            for i in range(n):
+                total += max(abs(values[i]), FLAT * largest) * vectors[a, i] * vectors[b, i]
+            hessian[a, b] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def new_qp_for(n: int, m: int) -> ElasticQP:
+    """Room for the quadratic program of a model: an unknown for the pool, two rows for an equality."""
+    return new_elastic_qp(n + 1, 2 * m + 1)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def propose(
+    model: LocalModel, m: int, price: float, radius: Floats, qp: ElasticQP, step: Floats, multipliers: Floats
+) -> float:
+    """Minimise the model of the merit function in the box.
+
+    Parameters
+    ----------
+    model : LocalModel
+        With a positive definite Hessian (see ``convexify``).
+    m : int
+        Number of rows.
+    price : float
+        Price of violation.
+    radius : (n,) float
+        Half-sides of the trust region.
+    qp : ElasticQP
+        Scratch, from ``new_qp_for``.
+    step : (n,) float
+        Receives the step.
+    multipliers : (m,) float
+        Receives the rows' multipliers.
+
+    Returns
+    -------
+    float
+        How much the model expects the merit to fall.
+    """
+    n = step.shape[0]
+    qp.hessian[:n, :n] = model.hessian
+    qp.hessian[n, n] = FLAT
+    qp.gradient[:n] = model.gradient
+    qp.gradient[n] = price
+    qp.radius[:n] = radius
+    # the pool's violation is one more unknown: at least 0, and at least what each of its rows lacks
+    qp.rows[0, :] = 0.0
+    qp.rows[0, n], qp.values[0], qp.price[0] = 1.0, 0.0, math.inf
+    rows, worst = 1, 0.0
+    for i in range(m):
+        for side in range(2 if model.equality[i] else 1):
+            sign = 1.0 - 2.0 * side
+            qp.values[rows] = sign * model.values[i]
+            for j in range(n):
+                qp.rows[rows, j] = sign * model.jacobian[i, j]
+            qp.rows[rows, n] = 1.0 if model.pooled[i] else 0.0
+            qp.price[rows] = math.inf if model.pooled[i] else price
+            rows += 1
+        if model.pooled[i]:
+            worst = max(worst, -model.values[i])
+    qp.radius[n] = 1.0 + 2.0 * worst
+    duals, step_and_pool = np.zeros(rows), np.zeros(n + 1)
+    solve_elastic_qp(qp, rows, step_and_pool, duals)
+    step[:] = step_and_pool[:n]
+    after = np.zeros(m)
+    rows = 1
+    for i in range(m):
+        after[i] = model.values[i]
+        for j in range(n):
+            after[i] += model.jacobian[i, j] * step[j]
+        multipliers[i] = duals[rows] - (duals[rows + 1] if model.equality[i] else 0.0)
+        rows += 2 if model.equality[i] else 1
+    expected = violation(model.values, model.equality, model.pooled, m)
+    expected = price * (expected - violation(after, model.equality, model.pooled, m))
+    for a in range(n):
+        expected -= model.gradient[a] * step[a]
+        for b in range(n):
+            expected -= 0.5 * step[a] * model.hessian[a, b] * step[b]
+    return expected
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def add_secant(change: Floats, step: Floats, estimate: Floats) -> None:
+    """Symmetric rank-one update, so that ``estimate`` maps ``step`` to ``change``."""
+    n = step.shape[0]
+    miss = np.zeros(n)
+    along, miss2, step2 = 0.0, 0.0, 0.0
+    for a in range(n):
+        miss[a] = change[a]
+        for b in range(n):
+            miss[a] -= estimate[a, b] * step[b]
+        along += miss[a] * step[a]
+        miss2 += miss[a] * miss[a]
+        step2 += step[a] * step[a]
+    if along * along > 1e-12 * miss2 * step2:
+        for a in range(n):
+            for b in range(n):
+                estimate[a, b] += miss[a] * miss[b] / along

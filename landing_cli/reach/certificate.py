@@ -1,0 +1,170 @@
+"""A proof that a facet cannot be reached: a lower bound on the thrust level from any multipliers.
+
+The least thrust level tau (a fraction of T_max) that reaches a facet is a gauge, so weak duality bounds
+it. Take multipliers lambda = (q, p) of the matching rows and z_j in Q of the handover cones with
+sum_j A_j' z_j = A_y' lambda. Every feasible flight then satisfies, with s = 1 - t,
+
+    tau [ int |p + q s| / m dt + sum_j z_j0 / m_j ]
+        >= -lambda' E - int |p + q s| gbar(t) dt - sup sum_j z_j' b_j ,
+
+where E holds the drift without gravity, gbar(t) bounds gravity wherever a flight with tau <= 1 can be at
+time t, and m, m_j are the least masses that tau <= 1 allows. A right-hand side that makes tau > 1
+therefore contradicts tau <= 1. |p + q s| is convex in t, so the trapezoid rule bounds its integral
+from above. The keep-out ellipsoid is left out: what it alone forbids is not proved here.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from landing_cli.body.gravity.bounds import largest_acceleration_on_ellipsoid, largest_acceleration_outside
+from landing_cli.body.gravity.field_values import accelerations
+from landing_cli.reach.records import LandingCase
+from landing_cli.reach.scaled_case import ScaledCase, gravity_on_arc
+
+Floats = NDArray[np.float64]
+
+TUBE_SHELLS = 16
+
+
+def gravity_tube(case: LandingCase, scaled: ScaledCase) -> Floats:
+    """Upper bounds of gravity along the descent stage, (N,), scaled.
+
+    In interval k no flight with full thrust can be nearer to the centre than its drift without forces
+    minus (1/m + g) t^2 / 2, nor inside the keep-out ellipsoid.
+    """
+    n = len(scaled.mid_cos)
+    field, unit = case.asteroid.gravity, 1.0 / scaled.acceleration_m_s2
+    on_ellipsoid = largest_acceleration_on_ellipsoid(field, case.ellipsoid_m) * unit
+    t = np.arange(n + 1) / n
+    drift = np.linalg.norm(scaled.position + t[:, None] * scaled.velocity, axis=1)
+    strongest = 1.0 / (1.0 - scaled.mass_flow) + on_ellipsoid
+    distance = drift - 0.5 * strongest * t**2
+    # within an interval the drift, which is straight, and the parabola stay this close to their chords
+    bend = strongest + float(scaled.velocity @ scaled.velocity) / max(drift.min(), 1e-6)
+    nearest = np.minimum(distance[:-1], distance[1:]) - bend / (8 * n**2)
+    shells = np.linspace(np.min(case.ellipsoid_m) / scaled.length_m, max(nearest.max(), 0.0), TUBE_SHELLS)
+    if shells[-1] <= shells[0]:
+        return np.full(n, on_ellipsoid)
+    bounds = largest_acceleration_outside(field, shells * scaled.length_m, case.ellipsoid_m) * unit
+    inner = np.searchsorted(shells, nearest, side="right") - 1
+    return np.where(inner < 0, on_ellipsoid, bounds[np.maximum(inner, 0)])
+
+
+def arc_gravity(case: LandingCase, scaled: ScaledCase) -> float:
+    """Upper bound of gravity on and above the surface, where the final arcs fly, scaled."""
+    at_vertices = np.linalg.norm(accelerations(case.asteroid.gravity, case.asteroid.mesh.vertices), axis=1)
+    # |g| has its largest value on the surface; facets lie below their vertices' sphere by little
+    return float(1.02 * at_vertices.max() / scaled.acceleration_m_s2)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _drift_work(case, target, q, p):
+    """-lambda' E for the drift without gravity: E_r = r_c - r0 - v0, E_v = w x r_c - v0."""
+    r, v = case.position, case.velocity
+    total = 0.0
+    for i in range(3):
+        total -= q[i] * (target[i] - r[i] - v[i]) - p[i] * v[i]
+    return total - case.spin * (p[1] * target[0] - p[0] * target[1])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _descent_integrals(case, tube, q, p):
+    """Upper bounds of int |p + q s| / m and int |p + q s| gbar by the trapezoid rule."""
+    n = tube.shape[0]
+    h = 1.0 / n
+    last = math.sqrt((p[0] + q[0]) ** 2 + (p[1] + q[1]) ** 2 + (p[2] + q[2]) ** 2)
+    by_thrust = by_gravity = 0.0
+    for k in range(n):
+        s = 1.0 - (k + 1) * h
+        norm = math.sqrt((p[0] + s * q[0]) ** 2 + (p[1] + s * q[1]) ** 2 + (p[2] + s * q[2]) ** 2)
+        area = 0.5 * h * (last + norm)
+        mass = 1.0 - min(case.mass_flow * (k + 1) * h, case.propellant)
+        by_thrust += area / mass
+        by_gravity += area * tube[k]
+        last = norm
+    return by_thrust, by_gravity
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _dual_feasible(case, model, q, p, duals):
+    """Make ``duals`` satisfy sum_j A_j' z_j = A_y' lambda, by way of the balls at the arc's two ends."""
+    arcs = case.arc_fractions.shape[0]
+    for j in range(arcs, arcs + 2):
+        z = duals[j]
+        z[0] = max(z[0], math.sqrt(z[1] * z[1] + z[2] * z[2]))
+    e = np.zeros(7)
+    for a in range(1, 7):
+        for i in range(3):
+            e[a] += model.row_y[i, a] * q[i] + model.row_y[3 + i, a] * p[i]
+        for j in range(arcs + 2):
+            for i in range(4):
+                e[a] -= model.cone_map[j, i, a] * duals[j, i]
+    # handover ball: the block of a_s is ((d, -c, 0), (c, d, 0), (0, 0, f)); solve with its transpose
+    A, z = model.cone_map[arcs - 1], duals[arcs - 1]
+    d, c = A[1, 4], A[2, 4]
+    scale = 1.0 / (d * d + c * c)
+    x0, x1, x2 = scale * (d * e[4] - c * e[5]), scale * (c * e[4] + d * e[5]), e[6] / A[3, 6]
+    z[1] += x0
+    z[2] += x1
+    z[3] += x2
+    # touchdown ball: its block of a_e is the identity
+    for a in range(1, 4):
+        duals[0, a] += e[a] - (A[1, a] * x0 + A[2, a] * x1 + A[3, a] * x2)
+    for j in range(arcs):
+        z = duals[j]
+        z[0] = math.sqrt(z[1] * z[1] + z[2] * z[2] + z[3] * z[3])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def certified_thrust_level(case, target, tube, arc_bound, model, multiplier, cone_dual, duals):
+    """Lower bound on the thrust level; above 1 it proves the facet unreachable.
+
+    Parameters
+    ----------
+    case : ScaledCase
+        The case.
+    target : (3,) float
+        Touchdown point, scaled.
+    tube : (N,) float
+        Bounds of gravity from :func:`gravity_tube`.
+    arc_bound : float
+        Bound from :func:`arc_gravity`.
+    model : Model
+        Its matching rows' and cones' constant derivatives.
+    multiplier : (R,) float
+        The first six are used; any values give a valid bound.
+    cone_dual : (J, 4) float
+        Any values; projected to dual feasibility.
+    duals : (J, 4) float
+        Scratch space.
+
+    Returns
+    -------
+    bound : float
+    """
+    q, p = multiplier[0:3], multiplier[3:6]
+    duals[:, :] = cone_dual
+    _dual_feasible(case, model, q, p, duals)
+    by_thrust, by_gravity = _descent_integrals(case, tube, q, p)
+    work = _drift_work(case, target, q, p) - by_gravity
+    W2 = case.spin * case.spin
+    for j in range(case.arc_fractions.shape[0]):
+        z = duals[j]
+        mass = 1.0 - min(
+            case.mass_flow * (1.0 + case.final_time * (1.0 - case.arc_fractions[j])), case.propellant
+        )
+        by_thrust += z[0] / mass
+        if case.compensated:
+            # z' b_j with b_j = -g + w x (w x r_c)
+            work += W2 * (z[1] * target[0] + z[2] * target[1])
+            if case.arc_fractions[j] == 0.0:
+                gx, gy, gz = gravity_on_arc(case, target[0], target[1], target[2])
+                work += z[1] * gx + z[2] * gy + z[3] * gz
+            else:
+                work -= z[0] * arc_bound
+    return work / by_thrust

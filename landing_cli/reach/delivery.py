@@ -1,0 +1,166 @@
+"""What is delivered for a facet: its flight integrated accurately, and every limit checked on it.
+
+The solver's path is second order in the interval. Here the stored thrust is flown by Runge-Kutta 4, the
+final arc is recomputed in closed form from the handover that is really reached, so the landing is exact,
+and the limits are measured on that flight.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from landing_cli.body.bvh import SurfaceIndex
+from landing_cli.body.clearance import path_clearance
+from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
+from landing_cli.reach.scaled_case import ScaledCase
+from landing_cli.reach.shooting import fly_accurately
+
+Floats = NDArray[np.float64]
+
+SUBSTEPS = 4
+
+# Limits are met when no scaled violation exceeds this: the last digits of the solver's convergence.
+LIMIT_TOLERANCE = 1e-5
+
+
+class Frame(NamedTuple):
+    """Physical facts of a case that the scaled problem does not carry."""
+
+    mass_kg: float
+    thrust_max_n: float
+    exhaust_velocity_m_s: float
+    descent_s: float
+    final_stage_s: float
+    rotation_rate_rad_s: float
+    propellant_kg: float  # infinite when unbounded
+    half_angle_rad: float
+    clear_radius_m: float  # one mean edge
+
+
+class Delivered(NamedTuple):
+    """One facet's flight as flown."""
+
+    performance_index_m2_s3: float
+    delta_v_m_s: float
+    fuel_kg: float
+    peak_descent: float
+    peak_final: float
+    ellipsoid_margin: float
+    glide_slope_margin_rad: float
+    terrain_clearance_m: float
+    handover_mass_kg: float
+    violation: float
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _to_body(case: ScaledCase, samples: Floats, path_m: Floats) -> float:
+    """Fill body-frame positions, m; return the least r' Re r - 1 of the descent."""
+    steps = samples.shape[0] - 1
+    least = 1e9
+    for row in range(steps + 1):
+        angle = case.spin * (row / steps - 1.0)
+        c, s = math.cos(angle), math.sin(angle)
+        x = c * samples[row, 0] + s * samples[row, 1]
+        y = c * samples[row, 1] - s * samples[row, 0]
+        z = samples[row, 2]
+        path_m[row, 0], path_m[row, 1], path_m[row, 2] = (
+            x * case.length_m,
+            y * case.length_m,
+            z * case.length_m,
+        )
+        a, b, d = x * case.inverse_axes[0], y * case.inverse_axes[1], z * case.inverse_axes[2]
+        least = min(least, a * a + b * b + d * d - 1.0)
+    return least
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def deliver(
+    case: ScaledCase,
+    frame: Frame,
+    surface: SurfaceIndex,
+    thrust: Floats,
+    target_m: Floats,
+    normal: Floats,
+    samples: Floats,
+    path_m: Floats,
+    handover: Floats,
+) -> Delivered:
+    """Fly one facet's stored thrust and measure it.
+
+    Parameters
+    ----------
+    case, frame, surface : ScaledCase, Frame, SurfaceIndex
+        The case and the asteroid's surface.
+    thrust : (N, 3) float
+        Scaled thrust, constant within each interval, solver axes.
+    target_m, normal : (3,) float
+        Touchdown point (m) and outward normal, body axes.
+    samples : (N SUBSTEPS + 1, 7) float
+        Scratch space.
+    path_m : (N SUBSTEPS + 1 + ARC_SAMPLES, 3) float
+        Filled with the path from start to touchdown, body frame, m.
+    handover : (6,) float
+        Filled with the handover position (m) and rotating-frame velocity (m/s).
+
+    Returns
+    -------
+    delivered : Delivered
+        The flight's cost and margins.
+    """
+    n, steps = thrust.shape[0], samples.shape[0] - 1
+    fly_accurately(case, thrust, SUBSTEPS, samples)
+    margin = _to_body(case, samples, path_m)
+    end = samples[steps]
+    speed = case.length_m / frame.descent_s
+    for i in range(3):
+        handover[i] = end[i] * case.length_m
+    handover[3] = (end[3] + case.spin * end[1]) * speed
+    handover[4] = (end[4] - case.spin * end[0]) * speed
+    handover[5] = end[5] * speed
+    off_ellipsoid = 0.0
+    if case.on_ellipsoid:
+        for i in range(3):
+            off_ellipsoid += (end[i] * case.inverse_axes[i]) ** 2
+        off_ellipsoid = abs(off_ellipsoid - 1.0)
+    energy = peak = 0.0
+    for k in range(n):
+        square = thrust[k, 0] ** 2 + thrust[k, 1] ** 2 + thrust[k, 2] ** 2
+        energy += 0.5 * square / n
+        peak = max(peak, math.sqrt(square))
+    handover_mass = end[6] * frame.mass_kg
+    arc = measure_arc(
+        handover,
+        handover_mass,
+        target_m,
+        normal,
+        frame.final_stage_s,
+        frame.rotation_rate_rad_s,
+        frame.exhaust_velocity_m_s,
+        case.gravity_kind,
+        case.gravity_params,
+        path_m[steps:],
+    )
+    peak_final = arc.peak_thrust_n if case.compensated else arc.peak_planned_thrust_n
+    peak_final /= frame.thrust_max_n
+    glide = frame.half_angle_rad - arc.glide_angle_rad
+    fuel = frame.mass_kg - arc.touchdown_mass_kg
+    violation = max(peak - 1.0, peak_final - 1.0, -margin, -glide, off_ellipsoid)
+    violation = max(violation, (fuel - frame.propellant_kg) / frame.mass_kg, 0.0)
+    clearance, _facet = path_clearance(surface, path_m, frame.clear_radius_m, 1e-3, np.inf)
+    return Delivered(
+        energy * case.acceleration_m_s2**2 * frame.descent_s + arc.energy_m2_s3,
+        frame.exhaust_velocity_m_s * math.log(frame.mass_kg / arc.touchdown_mass_kg),
+        fuel,
+        peak,
+        peak_final,
+        margin,
+        glide,
+        clearance,
+        handover_mass,
+        violation,
+    )

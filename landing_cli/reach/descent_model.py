@@ -1,0 +1,376 @@
+"""The two-stage landing on one facet, linearised at the solver's current point.
+
+Unknowns: the thrust F_k of the descent stage's intervals, and y = (tau, a_e, a_s): the thrust level and
+the final stage's acceleration at touchdown and at handover. With time-to-go s in [0, T] the final arc is
+r - r_c = s^2 (A + B s) with total acceleration a* = 2 A + 6 B s (Zhao 2022, eqs 13-14), linear in time,
+so that at s = sigma T
+
+    a*      = (1 - sigma) a_e + sigma a_s
+    r - r_c = T^2 [ (sigma^2 / 2 - sigma^3 / 6) a_e + sigma^3 / 6 a_s ]
+    v       = -T [ (sigma - sigma^2 / 2) a_e + sigma^2 / 2 a_s ]        (rotating frame).
+
+Rows: position and velocity match at the handover (6); the handover on the ellipsoid, in that reading (1);
+tangent planes of the ellipsoid at chosen nodes, and the propellant bound (inequalities). Cones on y: the
+final stage's thrust at a few points of the arc, and the glide slope at both ends of the arc: r - r_c is
+s^2 times an affine function of s, so both ends inside the convex cone mean the whole arc inside.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from landing_cli.reach.scaled_case import ellipsoid_normal, gravity_on_arc
+from landing_cli.reach.shooting import fly, pull_back
+
+Floats = NDArray[np.float64]
+
+# Below this thrust the direction of thrust is not used as a direction (derivatives of |F|).
+SMALL_THRUST = 1e-3
+
+
+class Cuts(NamedTuple):
+    """Tangent planes n . r >= level of the keep-out ellipsoid, each at one node."""
+
+    node: NDArray[np.int64]  # (C,)
+    normal: Floats  # (C, 3) solver axes
+
+
+class Layout(NamedTuple):
+    """How many rows and cones a facet's problem has, and what it minimises."""
+
+    n_equal: int  # equality rows
+    n_cuts: int
+    n_rows: int
+    n_cones: int
+    energy_weight: float  # weight rho of J in the objective
+    tau_free: bool  # minimise tau + rho J instead of rho J at tau = 1
+    level: float  # |xi| that the cuts keep (1 plus a margin for the path between nodes)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def new_cuts(size):
+    """Room for ``size`` cuts."""
+    return Cuts(np.zeros(size, dtype=np.int64), np.zeros((size, 3)))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def layout(case, n_cuts, energy_weight, tau_free, level):
+    """Count rows and cones for a case with ``n_cuts`` tangent planes."""
+    n_equal = 7 if case.on_ellipsoid else 6
+    n_rows = n_equal + n_cuts + (1 if case.propellant < 1.0 else 0)
+    n_cones = case.arc_fractions.shape[0] + 2
+    return Layout(n_equal, n_cuts, n_rows, n_cones, energy_weight, tau_free, level)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def arc_weights(sigma, final_time):
+    """Weights of (a_e, a_s) in a*, in r - r_c, and in v at time-to-go sigma T.
+
+    Returns
+    -------
+    a_e, a_s, r_e, r_s, v_e, v_s : float
+    """
+    T, s2 = final_time, sigma * sigma
+    return (
+        1.0 - sigma,
+        sigma,
+        T * T * s2 * (0.5 - sigma / 6.0),
+        T * T * s2 * sigma / 6.0,
+        -T * (sigma - 0.5 * s2),
+        -0.5 * T * s2,
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fill_handover_rows(case, model):
+    """Constant derivatives of the six matching rows with respect to y."""
+    spin = case.spin
+    _, _, r_e, r_s, v_e, v_s = arc_weights(1.0, case.final_time)
+    for i in range(6):
+        for a in range(7):
+            model.row_y[i, a] = 0.0
+    for i in range(3):
+        model.row_y[i, 1 + i], model.row_y[i, 4 + i] = -r_e, -r_s
+        model.row_y[3 + i, 1 + i], model.row_y[3 + i, 4 + i] = -v_e, -v_s
+    # inertial velocity = rotating velocity + w x r
+    model.row_y[3, 2] += spin * r_e
+    model.row_y[3, 5] += spin * r_s
+    model.row_y[4, 1] -= spin * r_e
+    model.row_y[4, 4] -= spin * r_s
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fill_arc_cones(case, model):
+    """Constant derivatives of the final stage's thrust with respect to (a_e, a_s).
+
+    Thrust per mass is a* - g + 2 w x v + w x (w x r) when compensated, a* in the paper's reading.
+    """
+    spin = case.spin
+    for j in range(case.arc_fractions.shape[0]):
+        A = model.cone_map[j]
+        A[:, :] = 0.0
+        a_e, a_s, r_e, r_s, v_e, v_s = arc_weights(case.arc_fractions[j], case.final_time)
+        for end in range(2):
+            a, r, v = (a_e, r_e, v_e) if end == 0 else (a_s, r_s, v_s)
+            c = 1 + 3 * end
+            for i in range(3):
+                A[1 + i, c + i] = a
+            if case.compensated:
+                A[1, c] -= spin * spin * r
+                A[2, c + 1] -= spin * spin * r
+                A[1, c + 1] -= 2.0 * spin * v
+                A[2, c] += 2.0 * spin * v
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fill_glide_cones(case, normal, model):
+    """Glide slope at handover (2 a_e + a_s) and at touchdown (a_e), about the facet normal."""
+    first = case.arc_fractions.shape[0]
+    n0, n1, n2 = normal[0], normal[1], normal[2]
+    # any two unit vectors that complete the normal
+    if abs(n2) < 0.9:
+        scale = 1.0 / math.sqrt(n0 * n0 + n1 * n1)
+        e0, e1, e2 = -n1 * scale, n0 * scale, 0.0
+    else:
+        scale = 1.0 / math.sqrt(n1 * n1 + n2 * n2)
+        e0, e1, e2 = 0.0, -n2 * scale, n1 * scale
+    f0, f1, f2 = n1 * e2 - n2 * e1, n2 * e0 - n0 * e2, n0 * e1 - n1 * e0
+    frame = ((n0, n1, n2), (e0, e1, e2), (f0, f1, f2))
+    for j in range(2):
+        A = model.cone_map[first + j]
+        A[:, :] = 0.0
+        model.cone_offset[first + j, :] = 0.0
+        for i in range(3):
+            scale = case.tan_half_angle if i == 0 else 1.0
+            for c in range(3):
+                if j == 0:
+                    A[i, 1 + c] = 2.0 * scale * frame[i][c]
+                    A[i, 4 + c] = scale * frame[i][c]
+                else:
+                    A[i, 1 + c] = scale * frame[i][c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fill_energy(case, rho, model):
+    """Hessian of rho J in y: J2 = T/6 (|a_e|^2 + a_e . a_s + |a_s|^2)."""
+    weight = rho * case.final_time / 6.0
+    model.y_hessian[:, :] = 0.0
+    for i in range(3):
+        model.y_hessian[1 + i, 1 + i] = model.y_hessian[4 + i, 4 + i] = 2.0 * weight
+        model.y_hessian[1 + i, 4 + i] = model.y_hessian[4 + i, 1 + i] = weight
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def handover_point(case, target, y):
+    """Handover position of the final arc, solver axes."""
+    _, _, r_e, r_s, _, _ = arc_weights(1.0, case.final_time)
+    return (
+        target[0] + r_e * y[1] + r_s * y[4],
+        target[1] + r_e * y[2] + r_s * y[5],
+        target[2] + r_e * y[3] + r_s * y[6],
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def refresh_arc(case, target, handover_mass, model, y):
+    """Gravity and mass along the final arc; returns the mass at touchdown.
+
+    Gravity enters the thrust cones as an offset, the mass as the radius tau / m of each ball. Both are
+    taken from the current arc, from the handover (sigma = 1) down to touchdown.
+    """
+    mass, last_sigma, last_norm = handover_mass, 1.0, 0.0
+    W2 = case.spin * case.spin
+    for j in range(case.arc_fractions.shape[0] - 1, -1, -1):
+        sigma = case.arc_fractions[j]
+        offset, A = model.cone_offset[j], model.cone_map[j]
+        offset[:] = 0.0
+        if case.compensated:
+            _, _, r_e, r_s, _, _ = arc_weights(sigma, case.final_time)
+            gx, gy, gz = gravity_on_arc(
+                case,
+                target[0] + r_e * y[1] + r_s * y[4],
+                target[1] + r_e * y[2] + r_s * y[5],
+                target[2] + r_e * y[3] + r_s * y[6],
+            )
+            offset[1], offset[2], offset[3] = -gx - W2 * target[0], -gy - W2 * target[1], -gz
+        norm2 = 0.0
+        for i in range(1, 4):
+            total = offset[i]
+            for a in range(1, 7):
+                total += A[i, a] * y[a]
+            norm2 += total * total
+        norm = math.sqrt(norm2)
+        if sigma < 1.0:
+            rate = 0.5 * case.mass_flow * (norm + last_norm)
+            mass *= math.exp(-rate * case.final_time * (last_sigma - sigma))
+        A[0, 0] = 1.0 / mass
+        last_sigma, last_norm = sigma, norm
+    return mass
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _refresh_matching(case, target, path, model, y):
+    """Values and thrust derivatives of the six matching rows."""
+    n = path.gradient.shape[0]
+    _, _, _, _, v_e, v_s = arc_weights(1.0, case.final_time)
+    x, yy, z = handover_point(case, target, y)
+    end, speed = path.position[n], path.velocity[n]
+    model.row_value[0], model.row_value[1], model.row_value[2] = end[0] - x, end[1] - yy, end[2] - z
+    model.row_value[3] = speed[0] + case.spin * yy - v_e * y[1] - v_s * y[4]
+    model.row_value[4] = speed[1] - case.spin * x - v_e * y[2] - v_s * y[5]
+    model.row_value[5] = speed[2] - v_e * y[3] - v_s * y[6]
+    pull_back(path, n, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, model.row_thrust[0])
+    pull_back(path, n, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, model.row_thrust[1])
+    pull_back(path, n, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, model.row_thrust[2])
+    pull_back(path, n, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, model.row_thrust[3])
+    pull_back(path, n, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, model.row_thrust[4])
+    pull_back(path, n, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, model.row_thrust[5])
+    for r in range(6):
+        model.row_end[r] = n
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _refresh_handover_on_ellipsoid(case, path, model, point):
+    """Row 6: the handover on the ellipsoid, |xi(r_p)| = 1, linearised.
+
+    Where its multiplier is positive the constraint bends the way of the objective, and its curvature
+    goes into the Hessian (through y, which moves the same handover).
+    """
+    n = path.gradient.shape[0]
+    end, wx = path.position[n], case.inverse_axes
+    nx, ny, nz = ellipsoid_normal(case, 1.0, 0.0, end[0], end[1], end[2])
+    level = nx * end[0] + ny * end[1] + nz * end[2]
+    model.row_value[6] = level - 1.0
+    model.row_y[6, :] = 0.0
+    model.row_end[6] = n
+    pull_back(path, n, nx, ny, nz, 0.0, 0.0, 0.0, model.row_thrust[6])
+    multiplier = point.multiplier[6]
+    if multiplier > 0.0:
+        _, _, r_e, r_s, _, _ = arc_weights(1.0, case.final_time)
+        normal = (nx, ny, nz)
+        weights = (r_e, r_s)
+        for a in range(3):
+            for b in range(3):
+                bend = (wx[a] * wx[a] if a == b else 0.0) - normal[a] * normal[b]
+                for p in range(2):
+                    for q in range(2):
+                        model.y_hessian[1 + a + 3 * p, 1 + b + 3 * q] += (
+                            multiplier * bend / level * weights[p] * weights[q]
+                        )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _refresh_cuts(case, path, model, cuts, plan, retake):
+    """Rows of the tangent planes; ``retake`` moves each to the current position of its node."""
+    for c in range(plan.n_cuts):
+        k, n, r = cuts.node[c], cuts.normal[c], plan.n_equal + c
+        x = path.position[k]
+        if retake:
+            n[0], n[1], n[2] = ellipsoid_normal(case, case.node_cos[k], case.node_sin[k], x[0], x[1], x[2])
+        model.row_value[r] = n[0] * x[0] + n[1] * x[1] + n[2] * x[2] - plan.level
+        model.row_y[r, :] = 0.0
+        model.row_end[r] = k
+        pull_back(path, k, n[0], n[1], n[2], 0.0, 0.0, 0.0, model.row_thrust[r])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _refresh_propellant(case, point, path, model, r, touchdown_mass):
+    """Row r: propellant left, P - (1 - m_touchdown) >= 0, with an isotropic bound of its curvature."""
+    n = path.gradient.shape[0]
+    h, flow = 1.0 / n, case.mass_flow
+    model.row_value[r] = case.propellant - (1.0 - touchdown_mass)
+    model.row_end[r] = n
+    eta = -point.multiplier[r]
+    for k in range(n):
+        F = point.thrust[k]
+        norm = max(math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), SMALL_THRUST)
+        for i in range(3):
+            model.row_thrust[r, k, i] = -flow * h * F[i] / norm
+        model.thrust_curvature[k] += eta * flow * h / max(norm, 0.05)
+    model.row_y[r, :] = 0.0
+    fractions = case.arc_fractions
+    last = fractions.shape[0] - 1
+    for j in range(last + 1):
+        width = 0.5 * (fractions[min(j + 1, last)] - fractions[max(j - 1, 0)])
+        A, b = model.cone_map[j], model.cone_offset[j]
+        thrust = np.zeros(3)
+        for i in range(3):
+            thrust[i] = b[1 + i]
+            for a in range(1, 7):
+                thrust[i] += A[1 + i, a] * point.y[a]
+        norm = max(math.sqrt(thrust[0] ** 2 + thrust[1] ** 2 + thrust[2] ** 2), SMALL_THRUST)
+        for a in range(1, 7):
+            along = (A[1, a] * thrust[0] + A[2, a] * thrust[1] + A[3, a] * thrust[2]) / norm
+            model.row_y[r, a] -= flow * touchdown_mass * case.final_time * width * along
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_mass_gradient(case, plan, point, path, model):
+    """Gradient through the mass: -c h lambda_m F / |F|, the mass costate carried back from the handover.
+
+    The rows hold the mass fixed; this term makes the stationarity residual exact (Zhao 2022, eqs 8, 11).
+    Returns the mass costate at the start.
+    """
+    n = path.gradient.shape[0]
+    h, costate = 1.0 / n, 0.0
+    for j in range(case.arc_fractions.shape[0]):
+        inverse = model.cone_map[j, 0, 0]
+        costate += point.cone_dual[j, 0] * point.y[0] * inverse * inverse
+    for k in range(n - 1, -1, -1):
+        F = point.thrust[k]
+        power = 0.0
+        for r in range(plan.n_equal + plan.n_cuts):
+            if model.row_end[r] > k:
+                S = model.row_thrust[r, k]
+                power += point.multiplier[r] * (S[0] * F[0] + S[1] * F[1] + S[2] * F[2])
+        slope = -power * 2.0 / (path.mass[k] + path.mass[k + 1])
+        norm = max(math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), SMALL_THRUST)
+        pull = case.mass_flow * h * (costate + 0.5 * slope) / norm
+        for i in range(3):
+            model.thrust_gradient[k, i] -= pull * F[i]
+        costate += slope
+    return costate
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def refresh(case, target, plan, cuts, retake, point, path, model):
+    """Linearise the whole problem at ``point``: fly it, and fill every row, cone and gradient.
+
+    Returns
+    -------
+    energy : float
+        J (Zhao 2022, eq 7), scaled.
+    mass_costate : float
+        Mass costate at the start.
+    """
+    n = point.thrust.shape[0]
+    h, rho, y = 1.0 / n, plan.energy_weight, point.y
+    fly(case, point.thrust, path)
+    fill_energy(case, rho, model)
+    touchdown_mass = refresh_arc(case, target, path.mass[n], model, y)
+    _refresh_matching(case, target, path, model, y)
+    energy = 0.0
+    for k in range(n):
+        F = point.thrust[k]
+        energy += 0.5 * h * (F[0] * F[0] + F[1] * F[1] + F[2] * F[2])
+        model.thrust_curvature[k] = rho * h
+        for i in range(3):
+            model.thrust_gradient[k, i] = rho * h * F[i]
+    weight = case.final_time / 6.0
+    model.y_gradient[0] = 1.0 if plan.tau_free else 0.0
+    for i in range(1, 4):
+        e, s = y[i], y[3 + i]
+        energy += weight * (e * e + e * s + s * s)
+        model.y_gradient[i] = rho * weight * (2.0 * e + s)
+        model.y_gradient[3 + i] = rho * weight * (2.0 * s + e)
+    if case.on_ellipsoid:
+        _refresh_handover_on_ellipsoid(case, path, model, point)
+    _refresh_cuts(case, path, model, cuts, plan, retake)
+    if case.propellant < 1.0:
+        _refresh_propellant(case, point, path, model, plan.n_rows - 1, touchdown_mass)
+    return energy, _add_mass_gradient(case, plan, point, path, model)

@@ -1,0 +1,290 @@
+"""One facet by the conic interior-point method: cold start, iterations, verdict of the solver.
+
+Flight, gravity, masses and tangent planes are linearised anew at every iteration, so there is no outer
+loop: the interior-point method is at the same time the Newton method on the nonlinear problem.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from landing_cli.optimize.conic_ipm import (
+    Model,
+    Point,
+    Step,
+    advance,
+    new_model,
+    new_point,
+    new_step,
+    residuals,
+)
+from landing_cli.reach.certificate import certified_thrust_level
+from landing_cli.reach.descent_model import (
+    Cuts,
+    fill_arc_cones,
+    fill_glide_cones,
+    fill_handover_rows,
+    new_cuts,
+    refresh,
+)
+from landing_cli.reach.records import Binding
+from landing_cli.reach.scaled_case import ellipsoid_normal
+from landing_cli.reach.shooting import Path, fly, measure_defect, new_path, pull_back
+
+Floats = NDArray[np.float64]
+
+STALLED, CONVERGED, CERTIFIED = 0, 1, 2
+
+# Places in Answer.pressure, less one for Binding.NONE.
+THRUST = int(Binding.THRUST) - 1
+ELLIPSOID = int(Binding.ELLIPSOID) - 1
+GLIDE_SLOPE = int(Binding.GLIDE_SLOPE) - 1
+PROPELLANT = int(Binding.PROPELLANT) - 1
+HANDOVER = int(Binding.HANDOVER) - 1
+
+TOLERANCE = 1e-7
+FIRST_CERTIFICATE = 4
+FIRST_DEFECT = 4
+
+
+class Answer(NamedTuple):
+    """The best flight found for a facet."""
+
+    thrust: Floats  # (N, 3)
+    y: Floats  # (7,)
+    costates: Floats  # (7,) of position, velocity and mass at the start, rotating frame, body axes
+    pressure: Floats  # (6,) by constraint: what loosening it by a relative unit takes off the objective
+
+
+class Solver(NamedTuple):
+    """Everything one facet's solve works in; allocated once and used for many facets."""
+
+    point: Point
+    model: Model
+    step: Step
+    path: Path
+    cuts: Cuts
+    duals: Floats  # (J, 4)
+    answer: Answer
+
+
+class Outcome(NamedTuple):
+    """How a solve ended."""
+
+    status: int  # STALLED, CONVERGED or CERTIFIED
+    iterations: int
+    energy: float  # J, scaled
+    bound: float  # certified lower bound on the thrust level
+    mass_costate: float  # at the start
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def new_solver(case):
+    """Allocate a solver for a scaled case."""
+    n = case.mid_cos.shape[0]
+    n_cones = case.arc_fractions.shape[0] + 2
+    n_rows = 7 + (n + 1) + 1
+    return Solver(
+        new_point(n, n_cones, n_rows),
+        new_model(n, n_cones, n_rows),
+        new_step(n, n_cones, n_rows),
+        new_path(n),
+        new_cuts(n + 1),
+        np.zeros((n_cones, 4)),
+        Answer(np.zeros((n, 3)), np.zeros(7), np.zeros(7), np.zeros(6)),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _start_thrust(case, target, normal, solver):
+    """Least-energy thrust to a plausible handover, from the unpowered flight's miss, clipped.
+
+    F = f0 + f1 s with int s F = E_r and int F = E_v, where E is the miss in position and velocity.
+    """
+    point, path = solver.point, solver.path
+    n, y = point.thrust.shape[0], point.y
+    point.thrust[:, :] = 0.0
+    path.defect[:] = 0.0
+    fly(case, point.thrust, path)
+    y[0] = 1.0
+    x = np.empty(3)
+    v = np.empty(3)
+    for i in range(3):
+        y[1 + i], y[4 + i] = 0.5 * normal[i], -0.2 * normal[i]
+        x[i] = target[i] + case.final_time**2 / 6.0 * 0.8 * normal[i]
+        v[i] = -case.final_time / 2.0 * 0.3 * normal[i]
+    v[0] -= case.spin * x[1]
+    v[1] += case.spin * x[0]
+    for i in range(3):
+        miss_r, miss_v = x[i] - path.position[n, i], v[i] - path.velocity[n, i]
+        f1 = 12.0 * (miss_r - 0.5 * miss_v)
+        f0 = miss_v - 0.5 * f1
+        for k in range(n):
+            point.thrust[k, i] = f0 + f1 * (1.0 - (k + 0.5) / n)
+    for k in range(n):
+        F = point.thrust[k]
+        norm = math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2])
+        if norm > 0.7:
+            for i in range(3):
+                F[i] *= 0.7 / norm
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cold_start(case, target, normal, plan, solver):
+    """Set the iterate to a well-centred point; the objective's scale sets the duals."""
+    point, model = solver.point, solver.model
+    _start_thrust(case, target, normal, solver)
+    fill_handover_rows(case, model)
+    fill_arc_cones(case, model)
+    fill_glide_cones(case, normal, model)
+    n = point.thrust.shape[0]
+    scale = 1.0 if plan.tau_free else plan.energy_weight
+    if plan.tau_free:
+        point.y[0] = 1.2
+    point.multiplier[:] = 0.0
+    for k in range(n):
+        point.node_dual[k, 0] = 0.5 * scale / n
+        for i in range(3):
+            point.node_dual[k, 1 + i] = -0.3 * point.node_dual[k, 0] * point.thrust[k, i] / point.y[0]
+    for r in range(plan.n_equal, plan.n_rows):
+        point.slack[r] = 0.05
+        point.multiplier[r] = -0.05 * scale
+    refresh(case, target, plan, solver.cuts, False, point, solver.path, model)
+    for j in range(plan.n_cones):
+        s, norm2 = point.cone_slack[j], 0.0
+        for i in range(4):
+            s[i] = model.cone_offset[j, i]
+            for a in range(7):
+                s[i] += model.cone_map[j, i, a] * point.y[a]
+            norm2 += s[i] * s[i] if i > 0 else 0.0
+        s[0] = max(s[0], math.sqrt(norm2) + 0.1)
+        point.cone_dual[j, :] = 0.0
+        point.cone_dual[j, 0] = 0.1 * scale
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def solve(case, target, normal, plan, retake_from, tube, arc_bound, limit, solver):
+    """Solve one facet from a cold start.
+
+    Parameters
+    ----------
+    case : ScaledCase
+        The case.
+    target, normal : (3,) float
+        Touchdown point (scaled) and outward facet normal, body axes.
+    plan : Layout
+        Rows, cones and objective.
+    retake_from : int
+        Iteration from which the tangent planes are moved to the current path.
+    tube, arc_bound : (N,) float, float
+        Bounds of gravity for the certificate.
+    limit : int
+        Most iterations.
+    solver : Solver
+        Its cuts are given; its point holds the answer.
+
+    Returns
+    -------
+    outcome : Outcome
+        How it ended.
+    """
+    point, model, step, path = solver.point, solver.model, solver.step, solver.path
+    cold_start(case, target, normal, plan, solver)
+    scale = 1.0 if plan.tau_free else plan.energy_weight
+    status, bound, energy, mass_costate = STALLED, 0.0, 0.0, 0.0
+    iteration = 0
+    while iteration < limit:
+        iteration += 1
+        retake = iteration >= retake_from
+        if iteration >= FIRST_DEFECT and iteration % 2 == 0:
+            measure_defect(case, point.thrust, path)
+        energy, mass_costate = refresh(case, target, plan, solver.cuts, retake, point, path, model)
+        primal, dual, gap = residuals(
+            point, model, step, plan.n_equal, plan.n_rows, plan.n_cones, plan.tau_free
+        )
+        if primal < TOLERANCE and dual < 10.0 * TOLERANCE * scale and gap < 10.0 * TOLERANCE * scale:
+            status = CONVERGED
+            break
+        if not plan.tau_free and iteration >= FIRST_CERTIFICATE:
+            bound = max(
+                bound,
+                certified_thrust_level(
+                    case, target, tube, arc_bound, model, point.multiplier, point.cone_dual, solver.duals
+                ),
+            )
+            if bound > 1.0:
+                status = CERTIFIED
+                break
+        if not math.isfinite(gap):
+            break
+        smallest = 0.1 * TOLERANCE * scale / (point.thrust.shape[0] + plan.n_cones + plan.n_rows)
+        advance(point, model, step, plan.n_equal, plan.n_rows, plan.n_cones, gap, smallest, plan.tau_free)
+    if plan.tau_free and status == CONVERGED:
+        bound = certified_thrust_level(
+            case, target, tube, arc_bound, model, point.multiplier, point.cone_dual, solver.duals
+        )
+    return Outcome(status, iteration, energy, bound, mass_costate)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _keep_costates(case, plan, solver, mass_costate):
+    """Carry the multipliers back to the start and turn them into the rotating frame.
+
+    With v_inertial = v + w x r the costates are lambda_v and lambda_r - w x lambda_v.
+    """
+    point, path, out = solver.point, solver.path, solver.answer.costates
+    m, scratch = point.multiplier, solver.step.node_residual
+    n, tail = path.gradient.shape[0], path.position[path.gradient.shape[0]]
+    p = np.zeros(6)
+    p[0], p[1], p[2], p[3], p[4], p[5] = pull_back(path, n, m[0], m[1], m[2], m[3], m[4], m[5], scratch)
+    for r in range(6, plan.n_equal + plan.n_cuts):
+        if r < plan.n_equal:
+            node = n
+            a, b, c = ellipsoid_normal(case, 1.0, 0.0, tail[0], tail[1], tail[2])
+        else:
+            node = solver.cuts.node[r - plan.n_equal]
+            normal = solver.cuts.normal[r - plan.n_equal]
+            a, b, c = normal[0], normal[1], normal[2]
+        t = pull_back(path, node, m[r] * a, m[r] * b, m[r] * c, 0.0, 0.0, 0.0, scratch)
+        for i in range(6):
+            p[i] += t[i]
+    p[0] += case.spin * p[4]
+    p[1] -= case.spin * p[3]
+    c, s = case.node_cos[0], case.node_sin[0]
+    for i in range(0, 6, 3):
+        out[i], out[i + 1], out[i + 2] = c * p[i] + s * p[i + 1], c * p[i + 1] - s * p[i], p[i + 2]
+    out[6] = mass_costate
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _keep_pressure(case, plan, solver):
+    """What a relative loosening of each constraint takes off the objective (envelope theorem)."""
+    point, out = solver.point, solver.answer.pressure
+    arcs = case.arc_fractions.shape[0]
+    out[:] = 0.0
+    for k in range(point.thrust.shape[0]):
+        out[THRUST] += point.node_dual[k, 0] * point.y[0]
+    for j in range(arcs):
+        out[THRUST] += point.cone_dual[j, 0] * solver.model.cone_map[j, 0, 0] * point.y[0]
+    for j in range(arcs, arcs + 2):
+        out[GLIDE_SLOPE] += point.cone_dual[j, 0] * point.cone_slack[j, 0]
+    for r in range(plan.n_equal, plan.n_equal + plan.n_cuts):
+        out[ELLIPSOID] -= point.multiplier[r] * plan.level
+    if case.on_ellipsoid:
+        out[HANDOVER] = abs(point.multiplier[6])
+    if case.propellant < 1.0:
+        out[PROPELLANT] = -point.multiplier[plan.n_rows - 1] * case.propellant
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def keep(case, plan, solver, mass_costate):
+    """Copy the solver's converged point into its answer."""
+    solver.answer.thrust[:, :] = solver.point.thrust
+    solver.answer.y[:] = solver.point.y
+    _keep_costates(case, plan, solver, mass_costate)
+    _keep_pressure(case, plan, solver)
