@@ -23,12 +23,16 @@ from shape import Shape, degree_two, least_ellipsoid, read_obj
 
 HERE = Path(__file__).resolve().parent
 SHAPES = HERE.parent.parent / "shapes"
-INTERVALS = 60
+INTERVALS = 40  # and the best again on twice as many
 SURVEY_INTERVALS = 30
 SURVEY_STARTS = ("straight", "far", "right")
+ENERGY_STARTS = ("straight", "far", "left", "right")
 BINDS = 1e-3  # an ellipsoid multiplier (scaled) above this shapes the path
 
 NORTH, EQUATOR, MIDDLE = (0.0, 0.0, 800.0), (800.0, 0.0, 0.0), (600.0, 0.0, 500.0)
+
+
+Chooser = Callable[["Case", np.random.Generator], list[int]]
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,7 @@ def predict(case: Case, known: dict[int, float]) -> np.ndarray:
     return RBFInterpolator(features[facets], values, kernel="linear", neighbors=40)(features)
 
 
-def near_boundary(count: int, far: int, survey: int = 90) -> Callable[..., list[int]]:
+def near_boundary(count: int, far: int, survey: int = 90) -> Chooser:
     """Chooser: facets with tau nearest 1 after two rounds of prediction, and some far ones."""
 
     def choose(case: Case, rng: np.random.Generator) -> list[int]:
@@ -106,7 +110,7 @@ def near_boundary(count: int, far: int, survey: int = 90) -> Callable[..., list[
     return choose
 
 
-def far_side(count: int) -> Callable[..., list[int]]:
+def far_side(count: int) -> Chooser:
     """Chooser: facets that the start does not see, where the ellipsoid should bind."""
 
     def choose(case: Case, rng: np.random.Generator) -> list[int]:
@@ -118,7 +122,7 @@ def far_side(count: int) -> Callable[..., list[int]]:
     return choose
 
 
-def spread(near: int, rest: int) -> Callable[..., list[int]]:
+def spread(near: int, rest: int) -> Chooser:
     """Chooser: some facets near the boundary and the rest anywhere."""
 
     def choose(case: Case, rng: np.random.Generator) -> list[int]:
@@ -129,11 +133,11 @@ def spread(near: int, rest: int) -> Callable[..., list[int]]:
     return choose
 
 
-def tables() -> dict[str, list[tuple[Case, Callable[..., list[int]]]]]:
+def tables() -> dict[str, Callable[[], list[tuple[Case, Chooser]]]]:
     """The tables by name: cases and how their facets are chosen."""
     places = {"north_pole": NORTH, "equator": EQUATOR, "mid_latitude": MIDDLE}
 
-    def over_bennu(tof: float, chooser: Callable[..., list[int]], **reading: str) -> list:
+    def over_bennu(tof: float, chooser: Chooser, **reading: str) -> list[tuple[Case, Chooser]]:
         return [(bennu(name, r0, tof, **reading), chooser) for name, r0 in places.items()]
 
     paper = {"handover": "on_ellipsoid", "final_thrust": "paper"}
@@ -191,7 +195,8 @@ def row_of(case: Case, facet: int, rng: np.random.Generator) -> dict[str, object
 
 def least_energy(problem: Problem, least: Local, rng: np.random.Generator) -> Answer:
     """Least J at full thrust, from the usual starts and from the path of least thrust level."""
-    return best_over_starts(problem, INTERVALS, "j", rng, extra={"tau": refine(least, INTERVALS)})
+    extra = {"tau": refine(least, INTERVALS)}
+    return best_over_starts(problem, INTERVALS, "j", rng, extra, ENERGY_STARTS)
 
 
 def checked(answer: tuple[str, float, float], which: int) -> str:
@@ -209,7 +214,7 @@ def header(case: Case) -> str:
 
 
 def make(name: str) -> None:
-    """Write one table; rows appear as they are solved."""
+    """Write one table, anew after each case."""
     cases = tables()[name]()
     rng = np.random.default_rng(20221012)
     rows = []
@@ -220,8 +225,14 @@ def make(name: str) -> None:
         print(
             f"{name} {case.name}: {len(facets)} facets, {time.process_time() - begun:.0f} s CPU", flush=True
         )
+        write(name, cases, rows)
+
+
+def write(name: str, cases: list[tuple[Case, Chooser]], rows: list[dict[str, object]]) -> None:
+    """Header lines for the cases that have rows, then the rows."""
+    done = {row["case"] for row in rows}
     with (HERE / f"{name}.csv").open("w", newline="") as file:
-        file.writelines(header(case) + "\n" for case, _ in cases)
+        file.writelines(header(case) + "\n" for case, _ in cases if case.name in done)
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
