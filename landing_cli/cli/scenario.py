@@ -102,7 +102,7 @@ def _plain(value: object) -> object:
 
 def _write_new(path: Path, text: str, force: bool) -> None:
     """Write a file whole or not at all, and never over another one unasked."""
-    from landing_cli.sources.shape_files import write_whole
+    from landing_cli.sources.whole_file import write_whole
 
     if path.exists() and not force:
         raise OutputRefused("is there already", where=str(path), fix="take another name, or --force")

@@ -10,7 +10,7 @@ import typer
 
 from landing_cli.cli import console
 from landing_cli.cli.options import Force, Json, Output, Quiet, new_group
-from landing_cli.errors import ExitCode, InputRefused, OutputRefused
+from landing_cli.errors import ExitCode, InputRefused, OutputRefused, UsageError
 
 if TYPE_CHECKING:
     from landing_cli.body.mesh import Mesh
@@ -88,39 +88,16 @@ def info(
 ) -> None:
     """Print size, mass properties, ellipsoid and gravity coefficients of a shape."""
     from landing_cli.body.shape_facts import shape_facts
+    from landing_cli.cli.shape_figures import facts_figures
 
     source = _read(shape, unit, index_base, quiet)
     facts = shape_facts(source.mesh, reference_radius_m)
-    degree2, dipole, principal = facts.degree2, facts.dipole, facts.principal
     figures = {
         "path": str(source.path),
         "sha256": source.sha256,
         "format": source.dialect,
         "indices_from": source.index_base,
-        "vertices": facts.vertex_count,
-        "facets": facts.facet_count,
-        "extents_m": facts.extents_m,
-        "volume_km3": facts.mass.volume_m3 / 1e9,
-        "area_km2": facts.area_m2 / 1e6,
-        "mean_radius_m": facts.mass.mean_radius_m,
-        "center_of_mass_m": facts.mass.center_of_mass_m,
-        "principal_moments_m2": principal.moments_m2,
-        "principal_axis_1_to_xyz_deg": principal.angles_deg[0],
-        "principal_axis_2_to_xyz_deg": principal.angles_deg[1],
-        "principal_axis_3_to_xyz_deg": principal.angles_deg[2],
-        "ellipsoid_m": facts.ellipsoid_m,
-        "mean_edge_m": facts.mean_edge_m,
-        "longest_edge_m": facts.longest_edge_m,
-        "equilateral_height_m": facts.equilateral_height_m,
-        "reference_radius_m": degree2.reference_radius_m,
-        "c20": degree2.c20,
-        "c21": degree2.c21,
-        "c22": degree2.c22,
-        "s21": degree2.s21,
-        "s22": degree2.s22,
-        "dipole_mass_fraction": dipole.mass_fraction if dipole else None,
-        "dipole_separation_m": dipole.separation_m if dipole else None,
-        "star_shaped": facts.star_shaped,
+        **facts_figures(facts),
     }
     if as_json:
         console.print_json(figures)
@@ -183,12 +160,7 @@ def import_shape(
 
     shape = read_shape(source, unit.value, index_base)
     path = output or Path(f"{source.stem}.obj")
-    header = [
-        f"{len(shape.mesh.vertices)} vertices, {len(shape.mesh.faces)} facets, km, body frame",
-        f"Imported from {shape.path.name} ({shape.dialect}, facets from {shape.index_base}, {unit.value})",
-        f"sha256 of the source: {shape.sha256}",
-    ]
-    _write(path, shape.mesh, header, force)
+    _write(path, shape.mesh, _import_header(shape), force)
     console.Console(quiet).say(f"wrote {path}")
 
 
@@ -213,6 +185,7 @@ def resample(
     The new mesh is written as OBJ in km; its deviation from the source is printed.
     """
     from landing_cli.body.resample import resampled
+    from landing_cli.cli.shape_figures import deviation_figures
     from landing_cli.sources.shape_files import rounded
 
     source = _read(shape, unit, None, quiet)
@@ -224,46 +197,81 @@ def resample(
         where = f"{source.path}, {error.where}" if error.where else str(source.path)
         raise InputRefused(error.what, where=where, fix=error.fix) from error
     header = [
-        *(note or []),
+        *(note or ()),
         f"{len(mesh.vertices)} vertices, {len(mesh.faces)} facets, km, body frame, origin of the source",
         f"Resampled by `landing shapes resample` from {source.path.name}, sha256 {source.sha256}",
     ]
     _write(path, mesh, header, force)
     console.Console(quiet).say(f"wrote {path}")
-    figures = {"path": str(path), **_deviation_figures(source.mesh, mesh)}
+    figures = {"path": str(path), **deviation_figures(source.mesh, mesh)}
     if as_json:
         console.print_json(figures)
     else:
         console.print_table(["quantity", "value"], [[name, _shown(value)] for name, value in figures.items()])
 
 
-def _deviation_figures(source: Mesh, mesh: Mesh) -> dict[str, object]:
-    """Compare a resampled mesh with its source."""
-    import numpy as np
+@app.command()
+def fetch(
+    body: Annotated[
+        str | None, typer.Argument(metavar="[BODY]", help="bennu, bacchus or eros: the official file.")
+    ] = None,
+    url: Annotated[str | None, typer.Option(metavar="URL", help="Another file, http or https.")] = None,
+    unit: Annotated[
+        Unit | None, typer.Option("--unit", "--length-unit", help="Length unit of the file at --url.")
+    ] = None,
+    sha256: Annotated[
+        str | None,
+        typer.Option(metavar="HEX", help="What the file must be; recorded on first use unless given."),
+    ] = None,
+    folder: Annotated[Path, typer.Option("--into", metavar="FOLDER", help="Where to put it.")] = Path(
+        "shapes"
+    ),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Download a shape model, check it, and write it as OBJ in km beside the download."""
+    from landing_cli.sources.download import fetch_file
+    from landing_cli.sources.shape_files import read_shape
 
-    from landing_cli.body.mass_properties import mass_properties
-    from landing_cli.body.surface_deviation import radial_deviation, triangle_quality
+    address, length_unit, published_hash = _address(body, url, unit)
+    voice = console.Console(quiet)
+    fetched = fetch_file(address, folder, sha256=sha256, published_hash=published_hash, force=force)
+    voice.say(f"{'downloaded' if fetched.fresh else 'found'} {fetched.path} (sha256 {fetched.sha256})")
+    shape = read_shape(fetched.path, length_unit.value)
+    path = fetched.path.with_suffix(".obj")
+    if path != fetched.path and (fetched.fresh or not path.exists()):
+        _write(path, shape.mesh, [f"Downloaded from {address}", *_import_header(shape)], force)
+        voice.say(f"wrote {path}")
+    console.print_text(str(path))
 
-    old, new = mass_properties(source), mass_properties(mesh)
-    forth = radial_deviation(source, mesh, old.center_of_mass_m)
-    back = radial_deviation(mesh, source, old.center_of_mass_m)
-    quality = triangle_quality(mesh)
-    return {
-        "vertices": len(mesh.vertices),
-        "facets": len(mesh.faces),
-        "source_to_new_rms_m": forth.rms_m,
-        "source_to_new_max_m": forth.greatest_m,
-        "new_to_source_rms_m": back.rms_m,
-        "new_to_source_max_m": back.greatest_m,
-        "volume_ratio_minus_1": new.volume_m3 / old.volume_m3 - 1.0,
-        "center_of_mass_m": new.center_of_mass_m,
-        "center_of_mass_shift_m": float(np.linalg.norm(new.center_of_mass_m - old.center_of_mass_m)),
-        "extents_m": np.ptp(mesh.vertices, axis=0),
-        "least_angle_deg": quality.least_angle_deg,
-        "greatest_angle_deg": quality.greatest_angle_deg,
-        "greatest_edge_ratio": quality.greatest_edge_ratio,
-        "longest_over_mean_edge": quality.longest_over_mean_edge,
-    }
+
+def _address(body: str | None, url: str | None, unit: Unit | None) -> tuple[str, Unit, str | None]:
+    """Tell the file to fetch, its unit, and its published hash."""
+    from landing_cli.sources.shape_archive import OFFICIAL_SHAPES
+
+    if (body is None) == (url is None):
+        raise UsageError("name a body or a --url", fix=f"the bodies are {', '.join(OFFICIAL_SHAPES)}")
+    if url is not None:
+        if unit is None:
+            raise UsageError("the length unit of the file at --url is not stated", fix="add --unit km or m")
+        return url, unit, None
+    official = OFFICIAL_SHAPES.get(str(body).lower())
+    if official is None:
+        raise UsageError(
+            f"no official file is known for {body!r}",
+            fix=f"the bodies are {', '.join(OFFICIAL_SHAPES)}; others by --url",
+        )
+    if unit is not None and unit.value != official.length_unit:
+        raise UsageError(f"the file of {body} is in {official.length_unit}", fix="leave --unit out")
+    return official.url, Unit(official.length_unit), official.published_hash
+
+
+def _import_header(shape: ShapeFile) -> list[str]:
+    return [
+        f"{len(shape.mesh.vertices)} vertices, {len(shape.mesh.faces)} facets, km, body frame",
+        f"Imported from {shape.path.name}: {shape.dialect}, {shape.length_unit}, from {shape.index_base}",
+        f"sha256 of the source: {shape.sha256}",
+    ]
 
 
 def _read(shape: str, unit: Unit, index_base: int | None, quiet: bool) -> ShapeFile:

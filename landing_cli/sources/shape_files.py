@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from landing_cli.errors import InputRefused, OutputRefused
 from landing_cli.sources.shape_lines import ShapeLines
 from landing_cli.sources.shape_records import Table, add_records
 from landing_cli.sources.shape_tables import add_table
+from landing_cli.sources.whole_file import write_whole
 
 LengthUnit = Literal["km", "m"]
 METRES: dict[str, float] = {"km": 1000.0, "m": 1.0}
@@ -265,16 +265,3 @@ def write_obj(path: Path | str, mesh: Mesh, header_lines: Sequence[str], length_
         raise OutputRefused(
             f"cannot be written: {error.strerror or error}", where=str(path), fix="choose another output path"
         ) from error
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write bytes to a temporary name beside the path, sync them, and rename."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with temporary.open("wb") as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
