@@ -2,7 +2,7 @@
 VENV ?= .venv
 PYTHON ?=
 SCENARIO ?= bennu.yaml
-RESULT ?= runs/bennu-reach-run.h5
+RESULT ?= runs/$(basename $(notdir $(SCENARIO)))-reach-run.h5
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 RUN_STAMP := $(VENV)/.installed-run

@@ -60,7 +60,11 @@ def run(
     """
     from landing_cli.parallel.plan import WorkPlan, pin_blas_threads
 
-    plan = WorkPlan(jobs=jobs or os.cpu_count() or 1, backend=backend.value, scheduler=scheduler)
+    plan = WorkPlan(
+        jobs=len(os.sched_getaffinity(0)) if jobs is None else jobs,
+        backend=backend.value,
+        scheduler=scheduler,
+    )
     pin_blas_threads()
     from landing_cli.scenario.load import load
 
