@@ -26,18 +26,8 @@ from landing_cli.errors import (
     VerificationFailed,
 )
 
-HEAVY = (
-    "numpy",
-    "scipy",
-    "numba",
-    "pydantic.main",
-    "yaml",
-    "h5py",
-    "matplotlib",
-    "rich",
-    "trimesh",
-    "joblib",
-)
+# pydantic is no part of it: the command-line library brings it in by itself
+HEAVY = ("numpy", "scipy", "numba", "yaml", "h5py", "matplotlib", "rich", "trimesh", "joblib")
 
 
 def script(program: str) -> list[str]:

@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import NoReturn
+from typing import NoReturn, TextIO
 
 from landing_cli.errors import ExitCode, LandingError, OutputRefused
 
@@ -157,11 +157,10 @@ def _print_traceback(error: Exception) -> None:
 class _GuardedStdout(io.TextIOWrapper):
     """Tell a reader that has gone from a device that is full, whoever writes."""
 
-    def __init__(self, stream: io.TextIOWrapper | None) -> None:
-        if stream is not None and hasattr(stream, "buffer"):
-            stream.flush()
+    def __init__(self, stream: TextIO | None) -> None:
+        if isinstance(stream, io.TextIOWrapper):
             raw, encoding, lines = stream.buffer, stream.encoding, stream.line_buffering
-        else:
+        else:  # it was closed, and leads to nothing by now
             raw, encoding, lines = open(1, "wb", closefd=False), "utf-8", False  # noqa: SIM115
         super().__init__(raw, encoding=encoding, errors="backslashreplace", line_buffering=lines)
 
