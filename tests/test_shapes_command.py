@@ -204,3 +204,33 @@ def test_help_needs_no_heavy_import():
     assert found.stdout.splitlines()[-1] == "[]"
     for command in ("list", "info", "check", "import", "resample", "fetch"):
         assert f" {command} " in found.stdout
+
+
+def test_info_agrees_with_the_figures_of_the_reference_shapes(workplace, reference_data, capsys, monkeypatch):
+    monkeypatch.setenv("LANDING_REFERENCE_DATA", str(reference_data.resolve()))
+    monkeypatch.chdir(workplace)
+    expected = {
+        ("bennu_radar_1348", "246"): {"c20": -0.03922, "c22": 0.003742, "equilateral_height_m": 21.4},
+        ("bacchus_radar_2048", "1000"): {
+            "c20": -0.02674,
+            "c22": 0.01313,
+            "s22": -0.00045,
+            "dipole_mass_fraction": 0.437,
+            "dipole_separation_m": 463.1,
+            "mean_edge_m": 30.6,
+        },
+        ("eros_near_3897", "16000"): {
+            "c20": -0.1185,
+            "c22": 0.0539,
+            "s22": -0.0182,
+            "long_axis_dipole_mass_fraction": 0.528,
+            "long_axis_dipole_separation_m": 15364.0,
+            "longest_edge_m": 853.0,
+        },
+    }
+    for (name, radius), figures in expected.items():
+        code, out, _ = run(capsys, "info", name, "--reference-radius", radius, "--json")
+        found = json.loads(out)
+        assert code == 0
+        for key, value in figures.items():
+            np.testing.assert_allclose(found[key], value, rtol=0.012 if key == "s22" else 2e-3, err_msg=key)

@@ -8,7 +8,13 @@ import numpy as np
 
 from landing_cli.body.adjacency import edge_lengths_m, equilateral_height_m
 from landing_cli.body.ellipsoid import least_volume_ellipsoid
-from landing_cli.body.gravity.coefficients import Degree2, Dipole, degree2_from_mesh, dipole_from_mesh
+from landing_cli.body.gravity.coefficients import (
+    Degree2,
+    Dipole,
+    degree2_from_mesh,
+    dipole_from_mesh,
+    long_axis_azimuth,
+)
 from landing_cli.body.mass_properties import (
     MassProperties,
     PrincipalAxes,
@@ -40,6 +46,8 @@ class ShapeFacts:
         About the centre of mass, along the body axes, unnormalised.
     dipole : Dipole or None
         Rotating mass dipole along x; None for a body that is not elongated along x.
+    long_axis_dipole : Dipole or None
+        The same along the longest axis in the equatorial plane, with its azimuth from x.
     star_shaped : bool
         About the centre of mass.
     """
@@ -56,6 +64,7 @@ class ShapeFacts:
     equilateral_height_m: float
     degree2: Degree2
     dipole: Dipole | None
+    long_axis_dipole: Dipole | None
     star_shaped: bool
 
 
@@ -88,13 +97,14 @@ def shape_facts(mesh: Mesh, reference_radius_m: float | None = None) -> ShapeFac
         longest_edge_m=float(lengths.max()),
         equilateral_height_m=equilateral_height_m(mesh),
         degree2=degree2_from_mesh(about_com, reference_radius_m or mass.mean_radius_m),
-        dipole=_dipole_or_none(about_com),
+        dipole=_dipole_or_none(about_com, 0.0),
+        long_axis_dipole=_dipole_or_none(about_com, long_axis_azimuth(about_com)),
         star_shaped=is_star_shaped(mesh, mass.center_of_mass_m),
     )
 
 
-def _dipole_or_none(mesh: Mesh) -> Dipole | None:
+def _dipole_or_none(mesh: Mesh, azimuth_rad: float) -> Dipole | None:
     try:
-        return dipole_from_mesh(mesh)
+        return dipole_from_mesh(mesh, azimuth_rad)
     except InputRefused:
         return None

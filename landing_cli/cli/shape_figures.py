@@ -23,7 +23,8 @@ def facts_figures(facts: ShapeFacts) -> dict[str, object]:
     dict
         Numbers, arrays of three numbers, truths.
     """
-    degree2, dipole, principal = facts.degree2, facts.dipole, facts.principal
+    degree2, principal = facts.degree2, facts.principal
+    dipole, turned = facts.dipole, facts.long_axis_dipole
     return {
         "vertices": facts.vertex_count,
         "facets": facts.facet_count,
@@ -48,6 +49,9 @@ def facts_figures(facts: ShapeFacts) -> dict[str, object]:
         "s22": degree2.s22,
         "dipole_mass_fraction": dipole.mass_fraction if dipole else None,
         "dipole_separation_m": dipole.separation_m if dipole else None,
+        "long_axis_azimuth_deg": float(np.degrees(turned.azimuth_rad)) if turned else None,
+        "long_axis_dipole_mass_fraction": turned.mass_fraction if turned else None,
+        "long_axis_dipole_separation_m": turned.separation_m if turned else None,
         "star_shaped": facts.star_shaped,
     }
 

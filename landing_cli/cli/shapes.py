@@ -137,7 +137,7 @@ def check(
     if as_json:
         console.print_json({"path": str(raw.path), "sound": sound, "checks": rows})
     else:
-        console.print_table(["check", "status"], [[row["check"], row["status"]] for row in rows])
+        console.print_table(["check", "status"], [[result.name, result.status] for result in results])
     for result in results:
         if result.fault:
             fault = InputRefused(result.fault.what, where=result.fault.where, fix=result.fault.fix)

@@ -105,6 +105,7 @@ def fetch_file(
     expected = sha256 or recorded
     if path.exists() and not force:
         return _held_to(path, expected)
+    made = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".fetch-", dir=folder) as scratch:
@@ -117,6 +118,9 @@ def fetch_file(
         write_whole(_record_path(path), f"{found}  {path.name}\n".encode())
     except OSError as error:
         raise OutputRefused(f"cannot be written: {error.strerror or error}", where=str(folder)) from error
+    finally:
+        if made and folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
     return Fetched(path, found, fresh=True)
 
 
