@@ -139,6 +139,25 @@ def test_a_short_run_before_the_domain_is_scattered_too(planet):
     assert 800.0 - planet.h < found.radius_m < 800.0
 
 
+def test_walk_passes_the_waist_of_a_peanut():
+    """Over a waist the distance from the start rises and falls along the section."""
+    ball = fibonacci_ellipsoid((1.0, 1.0, 1.0), 2048)
+    radius = 250.0 * (
+        1.0 + 1.2 * ball.vertices[:, 0] ** 4 - 0.45 * np.exp(-((ball.vertices[:, 0] / 0.25) ** 2))
+    )
+    peanut = Planet(Mesh(ball.vertices * radius[:, None], ball.faces))
+    everywhere = np.ones(len(peanut.points), dtype=bool)
+    for start in (np.array([0.0, 0.0, 600.0]), np.array([400.0, 0.0, 600.0])):
+        found = peanut.search(start, everywhere)
+        section = peanut.points[found.section_facets]
+        range_m = peanut.range_from(start)[found.section_facets]
+        assert np.sum(np.diff(range_m) < -0.1 * peanut.h) > 5
+        assert (section @ start).min() < -0.9 * (section @ start).max()  # to the far side
+        assert found.radius_m == range_m.max()
+        assert np.abs(found.radius_m - peanut.range_from(start).max()) < peanut.h
+        assert found.domain.mean() > 0.99
+
+
 def test_every_facet_is_asked_at_most_once(planet):
     truth = lobes(planet)
     asked: list[int] = []
@@ -167,7 +186,11 @@ def test_section_and_ring_lie_where_the_paper_puts_them(planet):
     section = planet.points[found.section_facets]
     assert np.all(np.abs(section @ north) <= 0.5 * planet.h)
     assert np.all(section @ np.cross(axis, north) > -0.5 * planet.h)
-    assert np.all(np.diff(planet.range_from(SLANTED)[found.section_facets]) >= 0)
+    angle = np.arccos(section @ axis / np.linalg.norm(section, axis=1))
+    assert np.all(np.diff(angle) >= -0.5 * planet.h / 250.0)
+    assert (
+        found.radius_m == planet.range_from(SLANTED)[found.section_facets[truth[found.section_facets]]].max()
+    )
     ring = np.abs(planet.range_from(SLANTED) - found.radius_m) < 0.5 * planet.h
     np.testing.assert_array_equal(found.ring_facets, np.flatnonzero(ring))
 

@@ -7,9 +7,10 @@ Where the paper is silent, this is what is done:
 
 - The section plane holds the line from the centre of mass to the initial position (the axis). Its azimuth
   about the axis counts right-handed from the body's +z, or from +x where the axis is the spin axis. Only the
-  half-plane on that side is walked: along a half, distance from the initial position orders the points. The
-  walk goes outwards, always asking for what lies within 3h of the last feasible point, and ends once nothing
-  there is feasible: whatever follows would be scattered.
+  half-plane on that side is walked, by the angle at the centre of mass from the axis (distance from the
+  initial position, which orders the points of a round body alike, leaps to and fro on a waisted one). The
+  walk always asks for what lies within 3h of the last feasible point, and ends once nothing there is
+  feasible: whatever follows would be scattered. The boundary point is the farthest of the points kept.
 - Scattered points: a run of feasible points that is cut off by more than 3h and shorter than that itself.
 - Boundary points are adjacent when no other lies between them in azimuth about the axis. A gap is
   discontinuous when its two ends are farther apart than 3h, or when it takes more than half of the circle.
@@ -197,12 +198,12 @@ def _view(points: FloatArray, initial_position_m: ArrayLike, h_m: float, azimuth
     across, along = points @ np.cross(axis, outward), points @ outward
     range_m = np.linalg.norm(points - start, axis=1)
     line = np.flatnonzero((np.abs(across) <= 0.5 * h_m) & (along > -0.5 * h_m))
-    line = line[np.argsort(range_m[line], kind="stable")]
+    line = line[np.argsort(np.arctan2(np.abs(along), points @ axis)[line], kind="stable")]
     return _View(points, range_m, np.arctan2(across, along), line, CONTINUITY * h_m)
 
 
 def _walk(view: _View, verdicts: _Verdicts) -> tuple[IntArray, int | None]:
-    """Walk the section outwards: the facets that were asked, and the last of the domain if there is one."""
+    """Walk the section outwards: the facets that were asked, and the boundary point if there is one."""
     line, points = view.line, view.points
     runs: list[list[int]] = [[]]
     at = 0
@@ -221,7 +222,8 @@ def _walk(view: _View, verdicts: _Verdicts) -> tuple[IntArray, int | None]:
             runs.append([])
     candidates = [run for run in runs if run and _is_long(run, view)]
     candidates = candidates or sorted(filter(None, runs), key=len, reverse=True)
-    return line[:at], candidates[0][-1] if candidates else None
+    farthest = max(candidates[0], key=lambda facet: view.range_m[facet]) if candidates else None
+    return line[:at], farthest
 
 
 def _is_long(run: list[int], view: _View) -> bool:
