@@ -10,6 +10,10 @@ from gravity_helpers import FIELDS, POTATO
 
 from landing_cli.body.gravity.bounds import (
     TOLERANCE,
+    _centres,
+    _fill_ceilings,
+    _sphere_triangles,
+    _split,
     largest_acceleration_on_ellipsoid,
     largest_acceleration_outside,
 )
@@ -78,6 +82,23 @@ def test_bound_holds_for_the_polyhedron_inside_its_least_ellipsoid() -> None:
     bound = largest_acceleration_on_ellipsoid(FIELDS["polyhedron"], semi_axes)
     largest = largest_on(FIELDS["polyhedron"], lambda u: semi_axes * u, 5000)
     assert largest <= bound <= 1.01 * largest
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("semi_axes", [SEMI_AXES, np.full(3, 330.0)], ids=["ellipsoid", "sphere"])
+def test_no_point_of_a_patch_exceeds_its_ceiling(name: str, semi_axes: np.ndarray) -> None:
+    # small patches too, where the slope decides and the second derivative hardly helps
+    coarse = _sphere_triangles()
+    field, triangles = FIELDS[name], np.vstack([coarse, _split(_split(_split(coarse[::23])))])
+    centres, angles = _centres(triangles)
+    at_centre, ceilings, reaches = np.zeros((3, len(triangles)))
+    _fill_ceilings(int(field.kind), field.params, centres, semi_axes, angles, at_centre, ceilings, reaches)
+    weights = np.vstack([np.eye(3), np.random.default_rng(4).dirichlet([0.5] * 3, 30)])
+    for patch, centre, ceiling, reach in zip(triangles, centres, ceilings, reaches, strict=True):
+        directions = weights @ patch
+        points = semi_axes * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        assert sizes(field, points).max() <= ceiling
+        assert np.linalg.norm(points - semi_axes * centre, axis=1).max() <= reach
 
 
 def test_point_mass_is_bounded_by_its_closed_form() -> None:
