@@ -9,7 +9,8 @@ import stat
 from contextlib import suppress
 from pathlib import Path
 
-from landing_cli.errors import InputRefused, OutputRefused
+from landing_cli.errors import OutputRefused
+from landing_cli.sources.guarded_file import open_regular
 
 LARGEST_FILE_BYTES = 4 << 30
 
@@ -138,23 +139,8 @@ def read_whole(path: Path) -> bytes:
     InputRefused
         If it is missing, no regular file, unreadable or too large.
     """
-    try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    except OSError as error:
-        raise InputRefused(
-            f"cannot be opened: {error.strerror}", where=str(path), fix="check the path"
-        ) from error
-    try:
-        status = os.fstat(descriptor)
-        if not stat.S_ISREG(status.st_mode):
-            raise InputRefused("is no regular file", where=str(path), fix="name a file")
-        if status.st_size > LARGEST_FILE_BYTES:
-            told = f"holds {status.st_size} bytes, more than {LARGEST_FILE_BYTES}"
-            raise InputRefused(told, where=str(path), fix="this is no file that this program writes")
-        with os.fdopen(descriptor, "rb", closefd=False) as file:
-            return file.read(status.st_size)
-    finally:
-        os.close(descriptor)
+    with open_regular(path, LARGEST_FILE_BYTES) as file:
+        return file.readall()
 
 
 def lock_file(path: Path) -> int:

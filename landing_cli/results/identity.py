@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import re
 from dataclasses import asdict, dataclass, field
 from typing import Any, Self
 
 SCHEMA_VERSION = 1
 LISTED_DIFFERENCES = 8
+_COMMENT = re.compile(r"(^|\s)#.*$")
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ class RunIdentity:
 
 
 def _changed_lines(before: str, now: str) -> list[str]:
-    old, new = ([line.strip().rstrip(",") for line in text.splitlines()] for text in (before, now))
+    old, new = ([_COMMENT.sub("", line).strip() for line in text.splitlines()] for text in (before, now))
     changes = []
     for kind, a, b, c, d in difflib.SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
         if kind != "equal":

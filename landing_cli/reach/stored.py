@@ -1,0 +1,295 @@
+"""A reach run as a tree on disk, and a chunk of its facets as a journal record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from landing_cli.body.asteroid import Asteroid
+from landing_cli.body.gravity.field import GravityField, GravityKind
+from landing_cli.body.mesh import Mesh
+from landing_cli.errors import InputRefused
+from landing_cli.flight.spacecraft import Spacecraft
+from landing_cli.reach.records import FACET_COLUMNS, FACET_DTYPE, FacetSolutions, LandingCase
+from landing_cli.results.store import StoredResult
+from landing_cli.results.tree import (
+    Dataset,
+    Group,
+    group_to_mapping,
+    mapping_to_group,
+    table_group,
+    table_rows,
+)
+
+MISSION = "reach"
+
+_CASE_NUMBERS = ("tof_s", "final_stage_s", "glide_slope_half_angle_rad")
+_CASE_VECTORS = ("position_m", "velocity_m_s", "ellipsoid_m")
+_CASE_CHOICES = ("handover", "final_stage_thrust", "descent", "terrain")
+
+
+@dataclass(frozen=True, eq=False)
+class CaseResult:
+    """What a run found for one case.
+
+    Attributes
+    ----------
+    case : LandingCase
+    initial_state : str
+        Name of the initial state.
+    solutions : FacetSolutions
+        In ascending facet order.
+    summary : mapping
+        Numbers, text and mappings of them, as printed.
+    boundary : Group or None
+        Datasets over the dimension ``point`` where a section or a tracer found the boundary.
+    lost : mapping of int to str
+        Why a facet could not be solved, by facet.
+    """
+
+    case: LandingCase
+    initial_state: str
+    solutions: FacetSolutions
+    summary: Mapping[str, Any] = field(default_factory=dict)
+    boundary: Group | None = None
+    lost: Mapping[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class ReachRun:
+    """A reach run: every case of one spacecraft over one asteroid.
+
+    Attributes
+    ----------
+    cases : tuple of CaseResult
+        At least one, in the scenario's order.
+    """
+
+    cases: tuple[CaseResult, ...]
+
+    @property
+    def asteroid(self) -> Asteroid:
+        """The asteroid that all cases share."""
+        return self.cases[0].case.asteroid
+
+    @property
+    def spacecraft(self) -> Spacecraft:
+        """The spacecraft that all cases share."""
+        return self.cases[0].case.spacecraft
+
+    @property
+    def lost_facets(self) -> int:
+        """How many facets of all cases could not be solved."""
+        return sum(len(case.lost) for case in self.cases)
+
+
+def solutions_to_arrays(solutions: FacetSolutions) -> dict[str, NDArray[Any]]:
+    """Encode solutions for the journal.
+
+    Parameters
+    ----------
+    solutions : FacetSolutions
+        Of a chunk of facets.
+
+    Returns
+    -------
+    dict of arrays
+    """
+    return {"rows": solutions.rows, "thrust_nodes_n": solutions.thrust_nodes_n}
+
+
+def solutions_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> FacetSolutions:
+    """Decode what ``solutions_to_arrays`` encoded.
+
+    Parameters
+    ----------
+    arrays : mapping of arrays
+        A journal record.
+
+    Raises
+    ------
+    InputRefused
+        If it is not of this version's types and shapes.
+    """
+    rows, nodes = arrays.get("rows"), arrays.get("thrust_nodes_n")
+    if rows is None or nodes is None or rows.dtype != FACET_DTYPE or nodes.dtype != np.float64:
+        raise _unfit("a journal record holds other columns than this version writes")
+    if rows.ndim != 1 or nodes.shape != (rows["thrust_nodes"].sum(dtype=np.int64), 3):
+        raise _unfit("a journal record's thrust nodes do not fit its rows")
+    return FacetSolutions(rows, nodes)
+
+
+def run_to_tree(run: ReachRun) -> Group:
+    """Lay a run out for the store.
+
+    Parameters
+    ----------
+    run : ReachRun
+        With at least one case.
+
+    Returns
+    -------
+    Group
+        With the groups ``body``, ``spacecraft`` and ``cases``.
+    """
+    craft = {name: value for name, value in vars(run.spacecraft).items() if value is not None}
+    cases = {c.case.name: _case_to_group(c, order) for order, c in enumerate(run.cases)}
+    return Group(
+        {
+            "body": _body_to_group(run.asteroid),
+            "spacecraft": Group({}, craft),
+            "cases": Group(cases),
+        },
+        {"mission": MISSION},
+    )
+
+
+def run_from_result(result: StoredResult) -> ReachRun:
+    """Rebuild a run from its file.
+
+    Parameters
+    ----------
+    result : StoredResult
+        As it was read.
+
+    Returns
+    -------
+    ReachRun
+        Equal to the run that was stored.
+
+    Raises
+    ------
+    InputRefused
+        If the file is of another mission, or lacks a part.
+    """
+    if result.mission != MISSION:
+        told = f"holds a result of '{result.mission}', not of '{MISSION}'"
+        raise InputRefused(told, where=str(result.path), fix="name a file that `reach run` wrote")
+    try:
+        return _run_from_tree(result.tree)
+    except (KeyError, ValueError, TypeError, IndexError) as error:
+        raise _unfit(f"lacks a part or holds a wrong one: {error}", str(result.path)) from error
+
+
+def _run_from_tree(tree: Group) -> ReachRun:
+    asteroid = _body_from_group(tree.group("body"))
+    craft = Spacecraft(**tree.group("spacecraft").attributes)  # type: ignore[arg-type]
+    groups = {name: tree.group("cases", name) for name in tree.group("cases").members}
+    ordered = sorted(groups, key=lambda name: _number(groups[name], "order"))
+    cases = tuple(_case_from_group(name, groups[name], asteroid, craft) for name in ordered)
+    if not cases:
+        raise ValueError("no case")
+    return ReachRun(cases)
+
+
+def _body_to_group(asteroid: Asteroid) -> Group:
+    mesh, gravity = asteroid.mesh, asteroid.gravity
+    members = {
+        "vertices": Dataset(mesh.vertices, "m", "vertices, body frame", ("vertex", "xyz")),
+        "faces": Dataset(mesh.faces, "1", "vertices of each facet, 0-based", ("facet", "corner")),
+        "gravity_params": Dataset(gravity.params, "1", "parameters of the gravity model, SI", ("parameter",)),
+    }
+    return Group(
+        members,
+        {
+            "name": asteroid.name,
+            "rotation_rate_rad_s": asteroid.rotation_rate_rad_s,
+            "gm_m3_s2": asteroid.gm_m3_s2,
+            "gravity": gravity.kind.name.lower(),
+        },
+    )
+
+
+def _body_from_group(group: Group) -> Asteroid:
+    mesh = Mesh(group.dataset("vertices").data, group.dataset("faces").data)
+    if mesh.vertices.shape[1:] != (3,) or mesh.faces.shape[1:] != (3,):
+        raise ValueError("the body's mesh is no list of triangles")
+    if mesh.faces.size and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
+        raise ValueError("a facet refers to a vertex that does not exist")
+    kind = GravityKind[str(group.attributes["gravity"]).upper()]
+    return Asteroid(
+        str(group.attributes["name"]),
+        mesh,
+        _number(group, "rotation_rate_rad_s"),
+        GravityField(kind, group.dataset("gravity_params").data),
+        _number(group, "gm_m3_s2"),
+    )
+
+
+def _case_to_group(result: CaseResult, order: int) -> Group:
+    case, solutions = result.case, result.solutions
+    names = (*_CASE_NUMBERS, *_CASE_VECTORS, *_CASE_CHOICES)
+    attributes: dict[str, Any] = {"order": order, "initial_state": result.initial_state}
+    attributes |= {name: getattr(case, name) for name in names}
+    members: dict[str, Dataset | Group] = {
+        "facets": table_group(solutions.rows, FACET_COLUMNS, "facet"),
+        "trajectories": _trajectories_to_group(solutions),
+        "summary": mapping_to_group(result.summary),
+    }
+    if result.boundary is not None:
+        members["boundary"] = result.boundary
+    if result.lost:
+        facets = np.array(sorted(result.lost), dtype=np.int32)
+        reasons = np.array([result.lost[facet] for facet in facets.tolist()])
+        members["lost"] = Group(
+            {
+                "facet": Dataset(facets, "1", "facets that could not be solved", ("facet",)),
+                "reason": Dataset(reasons, "1", "why", ("facet",)),
+            }
+        )
+    return Group(members, attributes)
+
+
+def _trajectories_to_group(solutions: FacetSolutions) -> Group:
+    told = "descent thrust, constant over equal intervals, in inertial axes equal to the body's at handover"
+    where = "row i of facets owns thrust_nodes_n[node_offsets[i]:node_offsets[i + 1]]"
+    return Group(
+        {
+            "thrust_nodes_n": Dataset(solutions.thrust_nodes_n, "N", told, ("node", "xyz")),
+            "node_offsets": Dataset(solutions.node_offsets, "1", where, ("offset",)),
+        }
+    )
+
+
+def _case_from_group(name: str, group: Group, asteroid: Asteroid, craft: Spacecraft) -> CaseResult:
+    facts: dict[str, Any] = {key: _number(group, key) for key in _CASE_NUMBERS}
+    facts |= {key: _vector(group, key) for key in _CASE_VECTORS}
+    facts |= {key: str(group.attributes[key]) for key in _CASE_CHOICES}
+    rows = table_rows(group.group("facets"), FACET_COLUMNS)
+    nodes = group.group("trajectories").dataset("thrust_nodes_n").data
+    solutions = solutions_from_arrays({"rows": rows, "thrust_nodes_n": nodes})
+    lost: dict[int, str] = {}
+    if "lost" in group.members:
+        table = group.group("lost")
+        facets, reasons = table.dataset("facet").data.tolist(), table.dataset("reason").data.tolist()
+        lost = dict(zip(facets, reasons, strict=True))
+    return CaseResult(
+        LandingCase(name, asteroid, craft, **facts),
+        str(group.attributes["initial_state"]),
+        solutions,
+        group_to_mapping(group.group("summary")),
+        group.group("boundary") if "boundary" in group.members else None,
+        lost,
+    )
+
+
+def _number(group: Group, name: str) -> float:
+    value = group.attributes[name]
+    if not isinstance(value, int | float):
+        raise ValueError(f"{name} is no number")
+    return value
+
+
+def _vector(group: Group, name: str) -> NDArray[np.float64]:
+    value = group.attributes[name]
+    if not isinstance(value, np.ndarray) or value.shape != (3,):
+        raise ValueError(f"{name} is no vector")
+    return value.astype(np.float64)
+
+
+def _unfit(what: str, where: str = "") -> InputRefused:
+    return InputRefused(what, where=where, fix="run again with --force, or use the version that wrote it")
