@@ -124,6 +124,15 @@ def test_writing_into_a_missing_folder_is_refused(tmp_path):
         write_obj(tmp_path / "no" / "a.obj", BODY, [], "km")
 
 
+@pytest.mark.parametrize("kind", ["pipe", "folder"])
+def test_only_regular_files_are_replaced(tmp_path, kind):
+    path = tmp_path / kind
+    os.mkfifo(path) if kind == "pipe" else path.mkdir()
+    with pytest.raises(OutputRefused, match="not a regular file"):
+        write_obj(path, BODY, [], "km")
+    assert list(tmp_path.iterdir()) == [path]
+
+
 def changed(lines: list[str], at: int, line: str) -> list[str]:
     return [*lines[:at], line, *lines[at + 1 :]]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 
@@ -21,6 +22,9 @@ def write_whole(path: Path, data: bytes) -> None:
     OSError
         If the system refuses; the old file is then untouched and nothing is left behind.
     """
+    if path.exists() and not path.is_file():
+        # Renaming would put a file in the place of a device.
+        raise OSError(errno.EINVAL, "not a regular file", str(path))
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with temporary.open("wb") as stream:
