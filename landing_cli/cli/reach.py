@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,7 +21,11 @@ from landing_cli.cli.options import (
 from landing_cli.errors import NothingFeasible, PartialResult
 
 if TYPE_CHECKING:
+    from landing_cli.reach.stored import ReachRun
     from landing_cli.scenario.load import LoadedScenario
+
+_COUNTS = ("case", "facets", "reachable", "unreachable", "unresolved", "reachable_area_m2")
+_SECTION = ("P_d", "P_r", "P_e", "n", "N", "ratio", "iou", "misclassified")
 
 app = new_program("Where on an asteroid the spacecraft can land.")
 
@@ -87,8 +91,44 @@ def run(
         voice.say(f"{path} is up to date: same scenario, shape and version (--force solves again)")
     else:
         voice.say(f"wrote {path}")
-    _print_summary(outcome.summary, as_json)
-    _judge(outcome.summary, outcome.lost_facets)
+    print_run(outcome.run, path, as_json)
+    _judge(outcome.run, path)
+
+
+def print_run(run: ReachRun, path: Path, as_json: bool) -> None:
+    """Print the summary of a run: a table, or the JSON object that scripts rely on.
+
+    Parameters
+    ----------
+    run : ReachRun
+        As it was solved, or read from its file.
+    path : Path
+        Its file.
+    as_json : bool
+        Print JSON.
+    """
+    cases = [
+        {
+            "case": result.case.name,
+            "initial_state": result.initial_state,
+            "tof_s": result.case.tof_s,
+            **result.summary,
+        }
+        for result in run.cases
+    ]
+    if as_json:
+        console.print_json({"run": str(path), "scenario": run.asteroid.name, "cases": cases})
+        return
+    rows = [
+        [*(case[key] for key in _COUNTS), *(case["delta_v_m_s"][key] for key in ("min", "median", "max"))]
+        for case in cases
+    ]
+    columns = [*_COUNTS, "dv_min_m_s", "dv_median_m_s", "dv_max_m_s"]
+    console.print_table(columns, rows, title=f"Reachable domain: {run.asteroid.name}")
+    sections = [(case["case"], case["section"]) for case in cases if case.get("section")]
+    if sections:
+        rows = [[name, *(section.get(key) for key in _SECTION)] for name, section in sections]
+        console.print_table(["case", *_SECTION], rows, title="Section and expansion")
 
 
 def _say_plan(loaded: LoadedScenario, path: Path, as_json: bool) -> None:
@@ -106,54 +146,17 @@ def _say_plan(loaded: LoadedScenario, path: Path, as_json: bool) -> None:
         console.print_table(list(cases[0]), [list(case.values()) for case in cases])
 
 
-def _print_summary(summary: dict[str, Any], as_json: bool) -> None:
-    if as_json:
-        console.print_json(summary)
-        return
-    columns = [
-        "case",
-        "facets",
-        "reachable",
-        "unreachable",
-        "unresolved",
-        "area_m2",
-        "dv_min",
-        "dv_median",
-        "dv_max",
-    ]
-    rows = [
-        [
-            case["case"],
-            case["facets"],
-            case["reachable"],
-            case["unreachable"],
-            case["unresolved"],
-            case["reachable_area_m2"],
-            *(case["delta_v_m_s"][key] for key in ("min", "median", "max")),
-        ]
-        for case in summary["cases"]
-    ]
-    console.print_table(columns, rows, title=f"Reachable domain: {summary['scenario']} (delta-v in m/s)")
-    sections = [case for case in summary["cases"] if case.get("section")]
-    if sections:
-        keys = ["P_d", "P_r", "P_e", "n", "N", "ratio", "iou", "misclassified"]
-        console.print_table(
-            ["case", *keys],
-            [[case["case"], *(case["section"].get(key) for key in keys)] for case in sections],
-        )
-
-
-def _judge(summary: dict[str, Any], lost_facets: int) -> None:
+def _judge(run: ReachRun, path: Path) -> None:
     """Turn what the run found into its exit code."""
-    if lost_facets:
+    if run.lost_facets:
         raise PartialResult(
-            f"{lost_facets} facets were lost to failures and stand as unresolved",
-            where=str(summary["run"]),
+            f"{run.lost_facets} facets were lost to failures and stand as unresolved",
+            where=str(path),
             fix="--resume tries them again",
         )
-    if not any(case["reachable"] for case in summary["cases"]):
+    if not any(result.summary["reachable"] for result in run.cases):
         raise NothingFeasible(
             "no facet is reachable in any case",
-            where=str(summary["scenario"]),
+            where=str(path),
             fix="lengthen reach.tof_s, or raise spacecraft.thrust_max_n",
         )
