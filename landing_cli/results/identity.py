@@ -77,7 +77,7 @@ class RunIdentity:
         """
         lines: list[str] = []
         if self.scenario != stored.scenario:
-            lines += _changed_lines(stored.scenario, self.scenario)
+            lines += _changed_lines(stored.scenario, self.scenario)  # comments change no number
         if self.shape_sha256 != stored.shape_sha256:
             lines.append(f"shape: sha256 {stored.shape_sha256[:12]}... -> {self.shape_sha256[:12]}...")
         for name in ("command", "package_version", "schema_version", "chunk_facets"):
@@ -94,7 +94,6 @@ def _changed_lines(before: str, now: str) -> list[str]:
     changes = []
     for kind, a, b, c, d in difflib.SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
         if kind != "equal":
-            changes.append(
-                f"scenario: {'; '.join(old[a:b]) or 'nothing'} -> {'; '.join(new[c:d]) or 'nothing'}"
-            )
-    return changes or ["scenario: white space"]
+            gone, come = ("; ".join(filter(None, lines)) or "nothing" for lines in (old[a:b], new[c:d]))
+            changes.append(f"scenario: {gone} -> {come}")
+    return changes

@@ -244,14 +244,14 @@ def digest(tree: Group) -> str:
     return sha.hexdigest()
 
 
-def _walk(path: str, node: Group | Dataset) -> Iterator[tuple[list[Any], memoryview | bytes]]:
+def _walk(path: str, node: Group | Dataset) -> Iterator[tuple[list[Any], Any]]:
     if isinstance(node, Dataset):
         data = node.data
         if data.dtype.kind == "U":  # the width of the stored type depends on nothing but the text
             data = np.char.encode(data, "utf-8")
         flags = sorted(node.flags.items()) if node.flags else []
         head = [path, "dataset", node.units, node.description, node.dims, flags, data.dtype.kind, data.shape]
-        yield [*head, data.dtype.itemsize], np.ascontiguousarray(data).tobytes()
+        yield [*head, data.dtype.itemsize], data.reshape(-1).view("u1")
         return
     yield [path, "group", sorted(node.members)], b""
     for name, value in sorted(node.attributes.items()):
