@@ -196,6 +196,9 @@ def test_a_reader_that_leaves_ends_the_command_quietly(tmp_path: Path) -> None:
     write_minimal(tmp_path)
     done = shell("LANDING scenario schema | head -1; echo ${PIPESTATUS[0]}", tmp_path)
     assert (done.stdout, done.stderr) == ("{\n0\n", "")
+    for command in ("scenario schema", "--help", "scenario show probe -q"):
+        done = shell(f"LANDING {command} | (exec <&-); echo ${{PIPESTATUS[0]}}", tmp_path)
+        assert (done.stdout, done.stderr) == ("0\n", ""), command
     for line in (
         "LANDING scenario show probe -q >&-",
         "LANDING --help >&-",
