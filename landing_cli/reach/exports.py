@@ -1,0 +1,159 @@
+"""Tables and maps of a reach run for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from landing_cli.errors import InputRefused
+from landing_cli.flight.trajectory import Trajectory
+from landing_cli.reach.records import FACET_COLUMNS
+from landing_cli.reach.stored import CaseResult, ReachRun
+from landing_cli.results.maps import WRITERS, on_every_facet
+from landing_cli.results.tables import (
+    Table,
+    group_table,
+    stacked,
+    summary_table,
+    to_csv,
+    to_json,
+    trajectory_table,
+)
+from landing_cli.results.tree import table_group
+
+TEXT_FORMATS: Mapping[str, Callable[[Table], str]] = {"csv": to_csv, "json": to_json}
+
+
+def facets_table(result: CaseResult) -> Table:
+    """Lay the facets of a case out as a table.
+
+    Parameters
+    ----------
+    result : CaseResult
+        The case.
+
+    Returns
+    -------
+    Table
+        In the order of the file's columns.
+    """
+    table = group_table(table_group(result.solutions.rows, FACET_COLUMNS, "facet"))
+    order = [c.name for c in FACET_COLUMNS]
+    ranked = sorted(table.columns, key=lambda name: _rank(name, order))
+    return Table({name: table.columns[name] for name in ranked})
+
+
+def boundary_table(result: CaseResult) -> Table:
+    """Lay the boundary of a case out as a table.
+
+    Parameters
+    ----------
+    result : CaseResult
+        The case.
+
+    Raises
+    ------
+    InputRefused
+        If the run's method found none.
+    """
+    if result.boundary is None:
+        raise InputRefused(
+            "this run traced no boundary",
+            where=result.case.name,
+            fix="run with --set reach.method=section, or with --compare",
+        )
+    return group_table(result.boundary)
+
+
+def chosen_cases(run: ReachRun, case: str | None) -> tuple[CaseResult, ...]:
+    """Return the case of a name, or all.
+
+    Parameters
+    ----------
+    run : ReachRun
+        The run.
+    case : str or None
+        Name of a case; None for all.
+
+    Raises
+    ------
+    InputRefused
+        If there is no such case.
+    """
+    chosen = tuple(c for c in run.cases if case in (None, c.case.name))
+    if not chosen:
+        names = ", ".join(c.case.name for c in run.cases)
+        raise InputRefused(f"no case '{case}'", where="--case", fix=f"take one of {names}")
+    return chosen
+
+
+def export_table(
+    run: ReachRun, table: str, form: str, case: str | None = None, trajectory: Trajectory | None = None
+) -> str:
+    """Write one of a run's tables.
+
+    Parameters
+    ----------
+    run : ReachRun
+        The run.
+    table : {"facets", "boundary", "summary", "trajectory"}
+        Which one.
+    form : {"csv", "json"}
+        How.
+    case : str, optional
+        One case only; otherwise all below each other, with their name as first column.
+    trajectory : Trajectory, optional
+        The flight to write, for ``trajectory``.
+
+    Raises
+    ------
+    InputRefused
+        If there is no such table, format or case.
+    """
+    if form not in TEXT_FORMATS:
+        fix = "take csv or json; ply, vtp and obj are for maps, oem for trajectories"
+        raise InputRefused(f"no format '{form}' for a table", where="--format", fix=fix)
+    cases = chosen_cases(run, case)
+    if table == "trajectory" and trajectory is not None:
+        laid = trajectory_table(trajectory)
+    elif table == "summary":
+        laid = summary_table([{"case": c.case.name, **c.summary} for c in cases])
+    elif table in ("facets", "boundary"):
+        make = facets_table if table == "facets" else boundary_table
+        laid = make(cases[0]) if case is not None else stacked({c.case.name: make(c) for c in cases})
+    else:
+        raise InputRefused(f"no table '{table}'", where="--table", fix="take facets, boundary or summary")
+    return TEXT_FORMATS[form](laid)
+
+
+def export_map(run: ReachRun, form: str, case: str | None = None) -> bytes:
+    """Write the map of a case.
+
+    Parameters
+    ----------
+    run : ReachRun
+        The run.
+    form : {"ply", "vtp", "obj"}
+        How.
+    case : str, optional
+        Which case; needed where there are several.
+
+    Raises
+    ------
+    InputRefused
+        If there is no such format or case, or several cases and none chosen.
+    """
+    if form not in WRITERS:
+        raise InputRefused(
+            f"no format '{form}' for a map", where="--format", fix=f"take {', '.join(WRITERS)}"
+        )
+    cases = chosen_cases(run, case)
+    if len(cases) > 1:
+        names = ", ".join(c.case.name for c in cases)
+        raise InputRefused("a map shows one case", where="--case", fix=f"take one of {names}")
+    mesh = run.asteroid.mesh
+    return WRITERS[form](mesh, on_every_facet(facets_table(cases[0]), len(mesh.faces)))
+
+
+def _rank(name: str, order: list[str]) -> int:
+    """Rank of a flat column: that of the longest stored column that its name begins with."""
+    return order.index(max((c for c in order if name == c or name.startswith(f"{c}_")), key=len))
