@@ -1,0 +1,119 @@
+"""A run like ``reach run`` with a made-up solver: the same dispatch, journal, store, signals and exit codes.
+
+``toy_run.py -o PATH [--resume] [--force] [--jobs N] [--backend B] [--trace FILE] [--deadly FACET]``
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import time
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from landing_cli.cli import guard
+
+CHUNK_FACETS = 16
+CASES = ("pole_700s", "pole_900s")
+FACETS = 320
+
+
+def solve(trace: Path | None, deadly: int | None, seed: int, facets):  # type: ignore[no-untyped-def]
+    """Make up an answer from the facet's number alone; the trace says which chunks were solved."""
+    import numpy as np
+
+    from landing_cli.reach.records import FacetSolutions, Verdict, blank_rows
+
+    rows, nodes = blank_rows(facets), []
+    for row, facet in zip(rows, facets.tolist(), strict=True):
+        if facet == deadly:
+            os.kill(os.getpid(), signal.SIGKILL)
+        rng = np.random.default_rng((seed, facet))
+        row["verdict"] = rng.choice(list(Verdict)[1:])
+        row["performance_index_m2_s3"] = rng.normal()
+        row["thrust_nodes"] = rng.integers(0, 41)
+        nodes.append(rng.normal(size=(row["thrust_nodes"], 3)))
+        time.sleep(0.002)
+    if trace is not None:
+        descriptor = os.open(trace, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+        os.write(descriptor, f"{seed}/{facets[0]}\n".encode())
+        os.close(descriptor)
+    return FacetSolutions(rows, np.concatenate(nodes))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run, resume or refuse, as a mission's pipeline does."""
+    choices = _choices(arguments)
+    from landing_cli.parallel import WorkPlan, pin_blas_threads
+
+    pin_blas_threads()
+    import numpy as np
+
+    from landing_cli.errors import PartialResult
+    from landing_cli.reach.recorded import solve_recorded
+    from landing_cli.reach.stored import CaseResult, ReachRun, run_to_tree
+    from landing_cli.results.identity import RunIdentity
+    from landing_cli.results.output import finish_output, open_output
+    from landing_cli.results.provenance import Stopwatch
+
+    watch = Stopwatch()
+    identity = RunIdentity(
+        "toy run", f"name: toy\nfacets: {FACETS}\n", "0" * 64, "1", chunk_facets=CHUNK_FACETS
+    )
+    journal = open_output(choices.output, identity, resume=choices.resume, force=choices.force)
+    if journal is None:
+        guard.tell(f"{choices.output} is up to date")
+        return 0
+    guard.hint_on_interrupt("continue with --resume")
+    plan = WorkPlan(choices.jobs, choices.backend)
+    chunks = [np.arange(i, i + CHUNK_FACETS) for i in range(0, FACETS, CHUNK_FACETS)]
+    with journal:
+        cases = []
+        for seed, (name, case) in enumerate(zip(CASES, _cases(), strict=True)):
+            work = partial(solve, choices.trace, choices.deadly if seed else None, seed)
+            solutions, lost = solve_recorded(journal, name, chunks, work, plan)
+            cases.append(CaseResult(case, "pole", solutions, {"facets": FACETS}, lost=lost))
+        result = ReachRun(tuple(cases))
+        guard.hint_on_interrupt("run again with --resume")
+        finish_output(journal, run_to_tree(result), {}, watch.provenance(), complete=not result.lost_facets)
+    print(f"wrote {choices.output}")
+    if result.lost_facets:
+        raise PartialResult(f"{result.lost_facets} facets were lost", fix="--resume tries them again")
+    return 0
+
+
+def _choices(arguments: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--resume", action="store_true")
+    parser.add_argument("--force", action="store_true")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--backend", default="threads")
+    parser.add_argument("--trace", type=Path)
+    parser.add_argument("--deadly", type=int)
+    return parser.parse_args(arguments)
+
+
+def _cases():  # type: ignore[no-untyped-def]
+    import numpy as np
+
+    from landing_cli.body.asteroid import Asteroid
+    from landing_cli.body.gravity.field import GravityField, GravityKind
+    from landing_cli.body.mesh import Mesh
+    from landing_cli.flight.spacecraft import Spacecraft
+    from landing_cli.reach.records import LandingCase
+
+    mesh = Mesh(np.eye(3), np.tile([[0, 1, 2]], (FACETS, 1)))
+    body = Asteroid("toy", mesh, 4e-4, GravityField(GravityKind.POINT_MASS, np.array([5.0])), 5.0)
+    craft, at, still, axes = Spacecraft(2000.0, 20.0, 400.0), np.array([0, 0, 800.0]), np.zeros(3), np.ones(3)
+    return [
+        LandingCase(n, body, craft, at, still, t, 200.0, axes, 1.0) for n, t in zip(CASES, (700.0, 900.0))
+    ]
+
+
+if __name__ == "__main__":
+    import toy_run  # the workers must find the solver in a module of that name
+
+    guard.run_process(toy_run.run)
