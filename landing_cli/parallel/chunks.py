@@ -2,40 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
-T = TypeVar("T")
+C = TypeVar("C")
 
 KILLS_BEFORE_BISECTION = 2
 
 
 @dataclass(frozen=True)
-class LostChunk(Generic[T]):
+class LostChunk(Generic[C]):
     """Items that no worker could finish.
 
     Attributes
     ----------
-    items : sequence
+    items : sequence or array
         The part of the chunk that is lost: one item where bisection found the culprit.
     reason : str
         Why, in words for the user.
     """
 
-    items: Sequence[T]
+    items: C
     reason: str
 
 
 @dataclass(frozen=True)
-class Attempt(Generic[T]):
+class Attempt(Generic[C]):
     """A chunk, or a piece of one, with the number of workers it has killed."""
 
     index: int
-    items: Sequence[T]
+    items: C
     kills: int = 0
 
-    def after_kill(self) -> list[Attempt[T]]:
+    def after_kill(self) -> list[Attempt[C]]:
         """What to try next once more a worker died on it; nothing left when a single item is guilty.
 
         Returns
@@ -47,8 +46,9 @@ class Attempt(Generic[T]):
         """
         if self.kills + 1 < KILLS_BEFORE_BISECTION:
             return [replace(self, kills=self.kills + 1)]
-        if len(self.items) <= 1:
+        items: Any = self.items
+        if len(items) <= 1:
             return []
-        middle = len(self.items) // 2
-        halves = (self.items[:middle], self.items[middle:])
+        middle = len(items) // 2
+        halves = (items[:middle], items[middle:])
         return [Attempt(self.index, half, kills=0 if len(half) == 1 else 1) for half in halves]

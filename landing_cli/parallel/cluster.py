@@ -15,7 +15,7 @@ from landing_cli import __version__
 from landing_cli.errors import InputRefused
 from landing_cli.parallel.chunks import Attempt, LostChunk
 
-T = TypeVar("T")
+C = TypeVar("C")
 R = TypeVar("R")
 
 CONNECT_TIMEOUT_S = 10.0
@@ -25,15 +25,15 @@ CHUNKS_IN_FLIGHT_PER_THREAD = 2
 
 
 def run_on_cluster(
-    function: Callable[[Sequence[T]], R], chunks: Sequence[Sequence[T]], scheduler: str
-) -> Generator[tuple[int, R | LostChunk[T]], None, None]:
+    function: Callable[[C], R], chunks: Sequence[C], scheduler: str
+) -> Generator[tuple[int, R | LostChunk[C]], None, None]:
     """Run chunks on a Dask cluster; see ``run_chunks``.
 
     Parameters
     ----------
     function : callable
         Picklable, from a module that the workers can import.
-    chunks : sequence of sequences
+    chunks : sequence
         The work.
     scheduler : str
         Address, ``tcp://host:port``.
@@ -51,7 +51,7 @@ def run_on_cluster(
     client = _connect(scheduler)
     try:
         _preflight(client, scheduler)
-        dispatch: _Dispatch[T, R] = _Dispatch(client, function, chunks, scheduler)
+        dispatch: _Dispatch[C, R] = _Dispatch(client, function, chunks, scheduler)
         while dispatch.has_work():
             dispatch.submit()
             yield from dispatch.answers()
@@ -134,18 +134,18 @@ def _threads_by_worker(client: Any) -> dict[str, int]:
         return {}
 
 
-class _Dispatch(Generic[T, R]):
+class _Dispatch(Generic[C, R]):
     """Chunks that wait, chunks in flight, and suspects that are tried alone."""
 
     def __init__(
-        self, client: Any, function: Callable[[Any], R], chunks: Sequence[Sequence[T]], scheduler: str
+        self, client: Any, function: Callable[[Any], R], chunks: Sequence[C], scheduler: str
     ) -> None:
         self._client = client
         self._function = function
         self._scheduler = scheduler
         self._waiting = deque(Attempt(i, chunk) for i, chunk in enumerate(chunks))
-        self._suspects: deque[Attempt[T]] = deque()
-        self._in_flight: dict[Any, Attempt[T]] = {}
+        self._suspects: deque[Attempt[C]] = deque()
+        self._in_flight: dict[Any, Attempt[C]] = {}
         self._arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._last_sign_of_life = time.monotonic()
         self._room = CHUNKS_IN_FLIGHT_PER_THREAD * sum(_threads_by_worker(client).values())
@@ -162,12 +162,12 @@ class _Dispatch(Generic[T, R]):
         if self._suspects and not self._in_flight:
             self._send(self._suspects.popleft())
 
-    def _send(self, attempt: Attempt[T]) -> None:
+    def _send(self, attempt: Attempt[C]) -> None:
         future = self._client.submit(self._function, attempt.items, pure=False)
         self._in_flight[future] = attempt
         future.add_done_callback(self._arrived.put)
 
-    def answers(self) -> Iterator[tuple[int, R | LostChunk[T]]]:
+    def answers(self) -> Iterator[tuple[int, R | LostChunk[C]]]:
         """Wait a second for chunks to come back; yield those that are done or lost."""
         try:
             future = self._arrived.get(timeout=1.0)
@@ -183,7 +183,7 @@ class _Dispatch(Generic[T, R]):
         else:  # cancelled or lost with the connection
             self._waiting.append(attempt)
 
-    def _after_error(self, attempt: Attempt[T], error: BaseException) -> Iterator[tuple[int, LostChunk[T]]]:
+    def _after_error(self, attempt: Attempt[C], error: BaseException) -> Iterator[tuple[int, LostChunk[C]]]:
         from distributed import KilledWorker
 
         if not isinstance(error, KilledWorker):
@@ -194,7 +194,7 @@ class _Dispatch(Generic[T, R]):
             reason = f"{error.allowed_failures + 1} Dask workers died while solving it, twice"
             yield attempt.index, LostChunk(attempt.items, reason)
 
-    def _check_pulse(self) -> Iterator[tuple[int, LostChunk[T]]]:
+    def _check_pulse(self) -> Iterator[tuple[int, LostChunk[C]]]:
         """Give up when the cluster has had no worker for long: nothing would ever come back."""
         threads = sum(_threads_by_worker(self._client).values())
         now = time.monotonic()

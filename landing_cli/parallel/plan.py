@@ -10,7 +10,7 @@ from typing import Literal, TypeVar
 from landing_cli.errors import UsageError
 from landing_cli.parallel.chunks import LostChunk
 
-T = TypeVar("T")
+C = TypeVar("C")
 R = TypeVar("R")
 
 BACKENDS = ("threads", "loky", "dask")
@@ -73,8 +73,8 @@ def pin_blas_threads() -> None:
 
 
 def run_chunks(
-    function: Callable[[Sequence[T]], R], chunks: Sequence[Sequence[T]], plan: WorkPlan
-) -> Generator[tuple[int, R | LostChunk[T]], None, None]:
+    function: Callable[[C], R], chunks: Sequence[C], plan: WorkPlan
+) -> Generator[tuple[int, R | LostChunk[C]], None, None]:
     """Run a function on every chunk and yield the answers as they come.
 
     Parameters
@@ -82,7 +82,7 @@ def run_chunks(
     function : callable
         Takes a chunk, returns its answer; picklable for ``loky`` and ``dask``. What it raises
         ends the run.
-    chunks : sequence of sequences
+    chunks : sequence of sequences or arrays
         Each can be sliced; a chunk that keeps killing its worker is cut in halves.
     plan : WorkPlan
         Where to run.

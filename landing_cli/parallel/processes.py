@@ -21,22 +21,22 @@ from landing_cli.parallel.chunks import Attempt, LostChunk
 from landing_cli.parallel.plan import BLAS_PINS
 from landing_cli.parallel.worker import serve
 
-T = TypeVar("T")
+C = TypeVar("C")
 R = TypeVar("R")
 
 STARTS_BEFORE_GIVING_UP = 3
 
 
 def run_on_processes(
-    function: Callable[[Sequence[T]], R], chunks: Sequence[Sequence[T]], jobs: int
-) -> Generator[tuple[int, R | LostChunk[T]], None, None]:
+    function: Callable[[C], R], chunks: Sequence[C], jobs: int
+) -> Generator[tuple[int, R | LostChunk[C]], None, None]:
     """Run chunks on worker processes; see ``run_chunks``.
 
     Parameters
     ----------
     function : callable
         Picklable.
-    chunks : sequence of sequences
+    chunks : sequence
         The work.
     jobs : int
         Number of processes.
@@ -46,7 +46,7 @@ def run_on_processes(
     (int, R or LostChunk)
         Index of a chunk and its answer, in the order of completion.
     """
-    pool: _Pool[T, R] = _Pool(function, chunks, jobs)
+    pool: _Pool[C, R] = _Pool(function, chunks, jobs)
     try:
         while pool.has_work():
             pool.hire()
@@ -56,14 +56,14 @@ def run_on_processes(
         pool.kill()
 
 
-class _Worker(Generic[T]):
+class _Worker(Generic[C]):
     """One process, its pipe, and the chunk that it works on."""
 
     def __init__(self) -> None:
         from joblib.externals.loky.backend import get_context
 
         self.connection, theirs = Pipe()
-        self.attempt: Attempt[T] | None = None
+        self.attempt: Attempt[C] | None = None
         self.ready = False
         self.process = get_context("loky").Process(target=serve, args=(theirs, os.getpid()), env=BLAS_PINS)
         # The child inherits the mask: Ctrl-C while it starts up must not end it with a traceback.
@@ -89,14 +89,14 @@ class _Worker(Generic[T]):
         return _epitaph(self.process.exitcode)
 
 
-class _Pool(Generic[T, R]):
+class _Pool(Generic[C, R]):
     """Workers, the chunks that wait, and what to do when a worker dies."""
 
-    def __init__(self, function: Callable[[Any], R], chunks: Sequence[Sequence[T]], jobs: int) -> None:
+    def __init__(self, function: Callable[[Any], R], chunks: Sequence[C], jobs: int) -> None:
         self._function = pickle.dumps(function)
         self._waiting = deque(Attempt(i, chunk) for i, chunk in enumerate(chunks))
         self._jobs = jobs
-        self._workers: list[_Worker[T]] = []
+        self._workers: list[_Worker[C]] = []
         self._failed_starts = 0
 
     def has_work(self) -> bool:
@@ -115,7 +115,7 @@ class _Pool(Generic[T, R]):
                 worker.attempt = self._waiting.popleft()
                 worker.send(pickle.dumps(worker.attempt.items))
 
-    def answers(self) -> Iterator[tuple[int, R | LostChunk[T]]]:
+    def answers(self) -> Iterator[tuple[int, R | LostChunk[C]]]:
         """Wait for some workers to speak; yield the chunks that are done or lost."""
         by_connection = {w.connection: w for w in self._workers}
         for connection in wait(list(by_connection)):
@@ -137,7 +137,7 @@ class _Pool(Generic[T, R]):
             if attempt:
                 yield attempt.index, content
 
-    def _bury(self, worker: _Worker[T]) -> Iterator[tuple[int, LostChunk[T]]]:
+    def _bury(self, worker: _Worker[C]) -> Iterator[tuple[int, LostChunk[C]]]:
         self._workers.remove(worker)
         reason = worker.kill()
         if worker.attempt:

@@ -11,22 +11,22 @@ from typing import Generic, TypeVar
 
 from landing_cli.parallel.chunks import LostChunk
 
-T = TypeVar("T")
+C = TypeVar("C")
 R = TypeVar("R")
 
 LONGEST_WAIT_S = 1.0
 
 
-class _Stoppable(Generic[T, R]):
+class _Stoppable(Generic[C, R]):
     """A function on chunks that can be told to start no more, and knows when it is idle."""
 
-    def __init__(self, function: Callable[[Sequence[T]], R]) -> None:
+    def __init__(self, function: Callable[[C], R]) -> None:
         self._function = function
         self._running = 0
         self._stopped = False
         self._changed = threading.Condition()
 
-    def __call__(self, index: int, chunk: Sequence[T]) -> tuple[int, R | None]:
+    def __call__(self, index: int, chunk: C) -> tuple[int, R | None]:
         with self._changed:
             if self._stopped:
                 return index, None
@@ -51,15 +51,15 @@ class _Stoppable(Generic[T, R]):
 
 
 def run_on_threads(
-    function: Callable[[Sequence[T]], R], chunks: Sequence[Sequence[T]], jobs: int
-) -> Generator[tuple[int, R | LostChunk[T]], None, None]:
+    function: Callable[[C], R], chunks: Sequence[C], jobs: int
+) -> Generator[tuple[int, R | LostChunk[C]], None, None]:
     """Run chunks on threads of this process; see ``run_chunks``.
 
     Parameters
     ----------
     function : callable
         Called from several threads at once.
-    chunks : sequence of sequences
+    chunks : sequence
         The work.
     jobs : int
         Number of threads.

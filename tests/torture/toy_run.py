@@ -108,9 +108,7 @@ def _cases():  # type: ignore[no-untyped-def]
     mesh = Mesh(np.eye(3), np.tile([[0, 1, 2]], (FACETS, 1)))
     body = Asteroid("toy", mesh, 4e-4, GravityField(GravityKind.POINT_MASS, np.array([5.0])), 5.0)
     craft, at, still, axes = Spacecraft(2000.0, 20.0, 400.0), np.array([0, 0, 800.0]), np.zeros(3), np.ones(3)
-    return [
-        LandingCase(n, body, craft, at, still, t, 200.0, axes, 1.0) for n, t in zip(CASES, (700.0, 900.0))
-    ]
+    return [LandingCase(name, body, craft, at, still, 700.0, 200.0, axes, 1.0) for name in CASES]
 
 
 if __name__ == "__main__":
