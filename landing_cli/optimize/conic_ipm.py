@@ -41,6 +41,8 @@ Ints = NDArray[np.int64]
 
 Y_SIZE = 7
 FRACTION_TO_BOUNDARY = 0.98
+# An equality in y alone has no Schur complement of its own; this bends it by a vanishing amount.
+ROW_REGULARISATION = 1e-9
 
 
 class Point(NamedTuple):
@@ -64,7 +66,8 @@ class Model(NamedTuple):
     row_end: Ints  # (R,) the row depends on the first row_end intervals only
     cone_map: Floats  # (J, 4, 7)
     cone_offset: Floats  # (J, 4)
-    thrust_gradient: Floats  # (N, 3) of the Lagrangian's smooth part without row_thrust' lambda
+    row_pull: Floats  # (N, 3) row_thrust' lambda
+    thrust_gradient: Floats  # (N, 3) of the Lagrangian's smooth part without row_pull
     thrust_curvature: Floats  # (N,) isotropic Hessian
     y_gradient: Floats  # (7,)
     y_hessian: Floats  # (7, 7)
@@ -123,6 +126,7 @@ def new_model(n_nodes, n_cones, n_rows):
         np.zeros((n_cones, 4, Y_SIZE)),
         np.zeros((n_cones, 4)),
         np.zeros((n_nodes, 3)),
+        np.zeros((n_nodes, 3)),
         np.zeros(n_nodes),
         np.zeros(Y_SIZE),
         np.zeros((Y_SIZE, Y_SIZE)),
@@ -160,6 +164,17 @@ def new_step(n_nodes, n_cones, n_rows):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def fill_row_pull(point, model, n_rows):
+    """Fill ``model.row_pull`` from the rows and their multipliers."""
+    model.row_pull[:, :] = 0.0
+    for r in range(n_rows):
+        multiplier = point.multiplier[r]
+        for k in range(model.row_end[r]):
+            for i in range(3):
+                model.row_pull[k, i] += multiplier * model.row_thrust[r, k, i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def residuals(point, model, step, n_equal, n_rows, n_cones, tau_free):
     """Fill the residuals of the optimality conditions.
 
@@ -192,18 +207,12 @@ def residuals(point, model, step, n_equal, n_rows, n_cones, tau_free):
     dual = 0.0
     for k in range(n_nodes):
         for i in range(3):
-            step.node_residual[k, i] = model.thrust_gradient[k, i] - point.node_dual[k, 1 + i]
+            residual = model.thrust_gradient[k, i] + model.row_pull[k, i] - point.node_dual[k, 1 + i]
+            step.node_residual[k, i] = residual
+            dual = max(dual, abs(residual) * n_nodes)
             gap += point.thrust[k, i] * point.node_dual[k, 1 + i]
         gap += tau * point.node_dual[k, 0]
         step.y_residual[0] -= point.node_dual[k, 0]
-    for r in range(n_rows):
-        multiplier = point.multiplier[r]
-        for k in range(model.row_end[r]):
-            for i in range(3):
-                step.node_residual[k, i] += multiplier * model.row_thrust[r, k, i]
-    for k in range(n_nodes):
-        for i in range(3):
-            dual = max(dual, abs(step.node_residual[k, i]) * n_nodes)
     if not tau_free:
         step.y_residual[0] = 0.0
     for a in range(Y_SIZE):
@@ -281,8 +290,11 @@ def factorise(point, model, step, n_equal, n_rows, n_cones, tau_free):
         for a in range(Y_SIZE):
             coupling[i, a] = model.row_y[i, a]
     _eliminate_nodes(point, model, step, n_rows)
-    for r in range(n_equal, n_rows):
-        schur[r, r] -= point.slack[r] / point.multiplier[r]
+    for r in range(n_rows):
+        if r >= n_equal:
+            schur[r, r] -= point.slack[r] / point.multiplier[r]
+        elif model.row_end[r] == 0:
+            schur[r, r] += ROW_REGULARISATION
     if not tau_free:
         for a in range(1, Y_SIZE):
             step.reduced[a, 0] = 0.0
@@ -307,16 +319,23 @@ def factorise(point, model, step, n_equal, n_rows, n_cones, tau_free):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _right_hand_side(point, model, step, n_equal, n_rows, n_cones, target, corrector, tau_free):
-    """Fill the right-hand sides; d_thrust holds H^-1 q of each node on return."""
+    """Fill the right-hand sides; d_thrust holds H^-1 q of each node on return.
+
+    The predictor aims at zero complementarity without the second-order term: its shift is -z.
+    """
     for a in range(Y_SIZE):
         step.rhs_y[a] = -step.y_residual[a]
     for i in range(n_rows):
         step.rhs_rows[i] = -step.row_residual[i]
     for j in range(n_cones):
         w, o, A = step.cone_scaling[j], step.cone_shift[j], model.cone_map[j]
-        o[0], o[1], o[2], o[3] = complementarity_shift(
-            w, w[4], point.cone_dual[j], step.d_cone_slack[j], step.d_cone_dual[j], target, corrector
-        )
+        z = point.cone_dual[j]
+        if corrector:
+            o[0], o[1], o[2], o[3] = complementarity_shift(
+                w, w[4], z, step.d_cone_slack[j], step.d_cone_dual[j], target
+            )
+        else:
+            o[0], o[1], o[2], o[3] = -z[0], -z[1], -z[2], -z[3]
         e = step.cone_residual[j]
         g0, g1, g2, g3 = apply_inverse_scaling_squared(w[0], w[1], w[2], w[3], w[4], e[0], e[1], e[2], e[3])
         g0, g1, g2, g3 = o[0] - g0, o[1] - g1, o[2] - g2, o[3] - g3
@@ -332,9 +351,13 @@ def _right_hand_side(point, model, step, n_equal, n_rows, n_cones, target, corre
     d_tau = step.d_y[0]
     for k in range(point.thrust.shape[0]):
         w, o, d = step.node_scaling[k], step.node_shift[k], step.d_thrust[k]
-        o[0], o[1], o[2], o[3] = complementarity_shift(
-            w, w[4], point.node_dual[k], (d_tau, d[0], d[1], d[2]), step.d_node_dual[k], target, corrector
-        )
+        z = point.node_dual[k]
+        if corrector:
+            o[0], o[1], o[2], o[3] = complementarity_shift(
+                w, w[4], z, (d_tau, d[0], d[1], d[2]), step.d_node_dual[k], target
+            )
+        else:
+            o[0], o[1], o[2], o[3] = -z[0], -z[1], -z[2], -z[3]
         inverse, f, h = step.node_inverse[k, 0], step.node_inverse[k, 1], step.node_inverse[k, 2]
         q0 = o[1] - step.node_residual[k, 0]
         q1 = o[2] - step.node_residual[k, 1]

@@ -74,11 +74,11 @@ def apply_inverse_scaling_squared(w0, w1, w2, w3, inverse_beta2, x0, x1, x2, x3)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def complementarity_shift(w, inverse_beta2, z, affine_ds, affine_dz, target, corrector):
+def complementarity_shift(w, inverse_beta2, z, affine_ds, affine_dz, target):
     """Return the constant o of the Newton step dz = o - W^-2 ds.
 
-    It solves lambda o (W dz + W^-1 ds) = target e - lambda o lambda [- (W^-1 ds_a) o (W dz_a)],
-    where ``o`` is the cone's Jordan product and the bracket is Mehrotra's second-order term.
+    It solves lambda o (W dz + W^-1 ds) = target e - lambda o lambda - (W^-1 ds_a) o (W dz_a), where
+    ``o`` is the cone's Jordan product and the last term is Mehrotra's second-order correction.
 
     Parameters
     ----------
@@ -88,8 +88,6 @@ def complementarity_shift(w, inverse_beta2, z, affine_ds, affine_dz, target, cor
         Scaling factor 1/beta^2.
     target : float
         Centring target sigma mu.
-    corrector : bool
-        Whether to include the second-order term.
 
     Returns
     -------
@@ -99,19 +97,16 @@ def complementarity_shift(w, inverse_beta2, z, affine_ds, affine_dz, target, cor
     scale = 1.0 / math.sqrt(2.0 * (w[0] + 1.0))
     v0, v1, v2, v3 = (w[0] + 1.0) * scale, w[1] * scale, w[2] * scale, w[3] * scale
     l0, l1, l2, l3 = apply_scaling(v0, v1, v2, v3, beta, z[0], z[1], z[2], z[3])
-    r0 = target - (l0 * l0 + l1 * l1 + l2 * l2 + l3 * l3)
-    r1, r2, r3 = -2.0 * l0 * l1, -2.0 * l0 * l2, -2.0 * l0 * l3
-    if corrector:
-        q0, q1, q2, q3 = apply_scaling(
-            v0, v1, v2, v3, beta, affine_dz[0], affine_dz[1], affine_dz[2], affine_dz[3]
-        )
-        p0, p1, p2, p3 = apply_inverse_scaling(
-            v0, v1, v2, v3, beta, affine_ds[0], affine_ds[1], affine_ds[2], affine_ds[3]
-        )
-        r0 -= p0 * q0 + p1 * q1 + p2 * q2 + p3 * q3
-        r1 -= p0 * q1 + q0 * p1
-        r2 -= p0 * q2 + q0 * p2
-        r3 -= p0 * q3 + q0 * p3
+    q0, q1, q2, q3 = apply_scaling(
+        v0, v1, v2, v3, beta, affine_dz[0], affine_dz[1], affine_dz[2], affine_dz[3]
+    )
+    p0, p1, p2, p3 = apply_inverse_scaling(
+        v0, v1, v2, v3, beta, affine_ds[0], affine_ds[1], affine_ds[2], affine_ds[3]
+    )
+    r0 = target - (l0 * l0 + l1 * l1 + l2 * l2 + l3 * l3) - (p0 * q0 + p1 * q1 + p2 * q2 + p3 * q3)
+    r1 = -2.0 * l0 * l1 - p0 * q1 - q0 * p1
+    r2 = -2.0 * l0 * l2 - p0 * q2 - q0 * p2
+    r3 = -2.0 * l0 * l3 - p0 * q3 - q0 * p3
     # x with lambda o x = r
     determinant = max(l0 * l0 - l1 * l1 - l2 * l2 - l3 * l3, TINY)
     x0 = (l0 * r0 - l1 * r1 - l2 * r2 - l3 * r3) / determinant

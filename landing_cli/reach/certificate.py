@@ -91,7 +91,7 @@ def _descent_integrals(case, tube, q, p):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _dual_feasible(case, model, q, p, duals):
+def _dual_feasible(case, model, multiplier, n_rows, duals):
     """Make ``duals`` satisfy sum_j A_j' z_j = A_y' lambda, by way of the balls at the arc's two ends."""
     arcs = case.arc_fractions.shape[0]
     for j in range(arcs, arcs + 2):
@@ -99,8 +99,8 @@ def _dual_feasible(case, model, q, p, duals):
         z[0] = max(z[0], math.sqrt(z[1] * z[1] + z[2] * z[2]))
     e = np.zeros(7)
     for a in range(1, 7):
-        for i in range(3):
-            e[a] += model.row_y[i, a] * q[i] + model.row_y[3 + i, a] * p[i]
+        for r in range(n_rows):
+            e[a] += model.row_y[r, a] * multiplier[r]
         for j in range(arcs + 2):
             for i in range(4):
                 e[a] -= model.cone_map[j, i, a] * duals[j, i]
@@ -149,7 +149,7 @@ def certified_thrust_level(case, target, tube, arc_bound, model, multiplier, con
     """
     q, p = multiplier[0:3], multiplier[3:6]
     duals[:, :] = cone_dual
-    _dual_feasible(case, model, q, p, duals)
+    _dual_feasible(case, model, multiplier, 6, duals)
     by_thrust, by_gravity = _descent_integrals(case, tube, q, p)
     work = _drift_work(case, target, q, p) - by_gravity
     W2 = case.spin * case.spin
@@ -167,4 +167,30 @@ def certified_thrust_level(case, target, tube, arc_bound, model, multiplier, con
                 work += z[1] * gx + z[2] * gy + z[3] * gz
             else:
                 work -= z[0] * arc_bound
+    return work / by_thrust
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def linearised_thrust_level(case, plan, point, model, duals):
+    """Lower bound on the thrust level of the problem as it is linearised now, tangent planes included.
+
+    The same weak duality with frozen gravity, masses and planes: no proof about the facet, but once it
+    is above 1 the least-energy iterations at full thrust have nothing to converge to.
+    """
+    duals[:, :] = point.cone_dual
+    work = by_thrust = 0.0
+    for r in range(plan.n_rows):
+        value = model.row_value[r]
+        for a in range(1, 7):
+            value -= model.row_y[r, a] * point.y[a]
+        work += point.multiplier[r] * value
+    for k in range(point.thrust.shape[0]):
+        pull, F = model.row_pull[k], point.thrust[k]
+        work -= pull[0] * F[0] + pull[1] * F[1] + pull[2] * F[2]
+        by_thrust += math.sqrt(pull[0] * pull[0] + pull[1] * pull[1] + pull[2] * pull[2])
+    _dual_feasible(case, model, point.multiplier, plan.n_rows, duals)
+    for j in range(plan.n_cones):
+        for i in range(4):
+            work -= duals[j, i] * model.cone_offset[j, i]
+        by_thrust += duals[j, 0] * model.cone_map[j, 0, 0]
     return work / by_thrust

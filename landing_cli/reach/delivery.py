@@ -18,11 +18,9 @@ from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import path_clearance
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
 from landing_cli.reach.scaled_case import ScaledCase
-from landing_cli.reach.shooting import fly_accurately
+from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
 
 Floats = NDArray[np.float64]
-
-SUBSTEPS = 4
 
 # Limits are met when no scaled violation exceeds this: the last digits of the solver's convergence.
 LIMIT_TOLERANCE = 1e-5
@@ -42,19 +40,30 @@ class Frame(NamedTuple):
     clear_radius_m: float  # one mean edge
 
 
-class Delivered(NamedTuple):
-    """One facet's flight as flown."""
+VALUE_COLUMNS = (
+    "performance_index_m2_s3",
+    "delta_v_m_s",
+    "fuel_kg",
+    "peak_thrust_ratio",
+    "peak_thrust_ratio_descent",
+    "peak_thrust_ratio_final",
+    "ellipsoid_margin",
+    "glide_slope_margin_deg",
+    "terrain_clearance_min_m",
+    "violation",
+)
 
-    performance_index_m2_s3: float
-    delta_v_m_s: float
-    fuel_kg: float
-    peak_descent: float
-    peak_final: float
-    ellipsoid_margin: float
-    glide_slope_margin_rad: float
-    terrain_clearance_m: float
-    handover_mass_kg: float
-    violation: float
+
+class Deliveries(NamedTuple):
+    """What is delivered for every facet of a batch."""
+
+    values: Floats  # (n, 10) by VALUE_COLUMNS
+    handover: Floats  # (n, 7) position (m) and rotating-frame velocity (m/s), body axes; mass (kg)
+
+
+def new_deliveries(size: int) -> Deliveries:
+    """Return deliveries filled with NaN."""
+    return Deliveries(np.full((size, len(VALUE_COLUMNS)), np.nan), np.full((size, 7), np.nan))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -88,8 +97,9 @@ def deliver(
     normal: Floats,
     samples: Floats,
     path_m: Floats,
+    values: Floats,
     handover: Floats,
-) -> Delivered:
+) -> None:
     """Fly one facet's stored thrust and measure it.
 
     Parameters
@@ -104,16 +114,11 @@ def deliver(
         Scratch space.
     path_m : (N SUBSTEPS + 1 + ARC_SAMPLES, 3) float
         Filled with the path from start to touchdown, body frame, m.
-    handover : (6,) float
-        Filled with the handover position (m) and rotating-frame velocity (m/s).
-
-    Returns
-    -------
-    delivered : Delivered
-        The flight's cost and margins.
+    values, handover : (10,) float, (7,) float
+        Filled; see Deliveries.
     """
     n, steps = thrust.shape[0], samples.shape[0] - 1
-    fly_accurately(case, thrust, SUBSTEPS, samples)
+    fly_accurately(case, thrust, samples)
     margin = _to_body(case, samples, path_m)
     end = samples[steps]
     speed = case.length_m / frame.descent_s
@@ -149,18 +154,41 @@ def deliver(
     peak_final /= frame.thrust_max_n
     glide = frame.half_angle_rad - arc.glide_angle_rad
     fuel = frame.mass_kg - arc.touchdown_mass_kg
-    violation = max(peak - 1.0, peak_final - 1.0, -margin, -glide, off_ellipsoid)
-    violation = max(violation, (fuel - frame.propellant_kg) / frame.mass_kg, 0.0)
+    excess = max(peak - 1.0, peak_final - 1.0, -margin, -glide, off_ellipsoid)
+    excess = max(excess, (fuel - frame.propellant_kg) / frame.mass_kg)
     clearance, _facet = path_clearance(surface, path_m, frame.clear_radius_m, 1e-3, np.inf)
-    return Delivered(
-        energy * case.acceleration_m_s2**2 * frame.descent_s + arc.energy_m2_s3,
-        frame.exhaust_velocity_m_s * math.log(frame.mass_kg / arc.touchdown_mass_kg),
-        fuel,
-        peak,
-        peak_final,
-        margin,
-        glide,
-        clearance,
-        handover_mass,
-        violation,
-    )
+    handover[6] = handover_mass
+    values[0] = energy * case.acceleration_m_s2**2 * frame.descent_s + arc.energy_m2_s3
+    values[1] = frame.exhaust_velocity_m_s * math.log(frame.mass_kg / arc.touchdown_mass_kg)
+    values[2] = fuel
+    values[3], values[4], values[5] = max(peak, peak_final), peak, peak_final
+    values[6], values[7], values[8] = margin, math.degrees(glide), clearance
+    values[9] = excess if excess > LIMIT_TOLERANCE else 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def deliver_many(
+    case: ScaledCase,
+    frame: Frame,
+    surface: SurfaceIndex,
+    thrusts: Floats,
+    targets_m: Floats,
+    normals: Floats,
+    out: Deliveries,
+) -> None:
+    """Deliver a batch of facets; see :func:`deliver`."""
+    steps = thrusts.shape[1] * SUBSTEPS + 1
+    samples, path_m = np.empty((steps, 7)), np.empty((steps + ARC_SAMPLES, 3))
+    for i in range(thrusts.shape[0]):
+        deliver(
+            case,
+            frame,
+            surface,
+            thrusts[i],
+            targets_m[i],
+            normals[i],
+            samples,
+            path_m,
+            out.values[i],
+            out.handover[i],
+        )

@@ -24,6 +24,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from landing_cli.optimize.conic_ipm import fill_row_pull
 from landing_cli.reach.scaled_case import ellipsoid_normal, gravity_on_arc
 from landing_cli.reach.shooting import fly, pull_back
 
@@ -235,33 +236,30 @@ def _refresh_matching(case, target, path, model, y):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _refresh_handover_on_ellipsoid(case, path, model, point):
-    """Row 6: the handover on the ellipsoid, |xi(r_p)| = 1, linearised.
+def _refresh_handover_on_ellipsoid(case, target, model, point):
+    """Row 6: the handover on the ellipsoid, |xi(r_p)| = 1, linearised in y.
 
     Where its multiplier is positive the constraint bends the way of the objective, and its curvature
-    goes into the Hessian (through y, which moves the same handover).
+    goes into the Hessian.
     """
-    n = path.gradient.shape[0]
-    end, wx = path.position[n], case.inverse_axes
-    nx, ny, nz = ellipsoid_normal(case, 1.0, 0.0, end[0], end[1], end[2])
-    level = nx * end[0] + ny * end[1] + nz * end[2]
+    x, y, z = handover_point(case, target, point.y)
+    nx, ny, nz = ellipsoid_normal(case, 1.0, 0.0, x, y, z)
+    level = nx * x + ny * y + nz * z
+    _, _, r_e, r_s, _, _ = arc_weights(1.0, case.final_time)
+    normal, weights, wx = (nx, ny, nz), (r_e, r_s), case.inverse_axes
     model.row_value[6] = level - 1.0
-    model.row_y[6, :] = 0.0
-    model.row_end[6] = n
-    pull_back(path, n, nx, ny, nz, 0.0, 0.0, 0.0, model.row_thrust[6])
-    multiplier = point.multiplier[6]
-    if multiplier > 0.0:
-        _, _, r_e, r_s, _, _ = arc_weights(1.0, case.final_time)
-        normal = (nx, ny, nz)
-        weights = (r_e, r_s)
+    model.row_end[6] = 0
+    model.row_y[6, 0] = 0.0
+    bend = max(point.multiplier[6], 0.0) / level
+    for p in range(2):
         for a in range(3):
-            for b in range(3):
-                bend = (wx[a] * wx[a] if a == b else 0.0) - normal[a] * normal[b]
-                for p in range(2):
-                    for q in range(2):
-                        model.y_hessian[1 + a + 3 * p, 1 + b + 3 * q] += (
-                            multiplier * bend / level * weights[p] * weights[q]
-                        )
+            model.row_y[6, 1 + a + 3 * p] = weights[p] * normal[a]
+            for q in range(2):
+                for b in range(3):
+                    curvature = (wx[a] * wx[a] if a == b else 0.0) - normal[a] * normal[b]
+                    model.y_hessian[1 + a + 3 * p, 1 + b + 3 * q] += (
+                        bend * curvature * weights[p] * weights[q]
+                    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -310,7 +308,7 @@ def _refresh_propellant(case, point, path, model, r, touchdown_mass):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_mass_gradient(case, plan, point, path, model):
+def _add_mass_gradient(case, point, path, model):
     """Gradient through the mass: -c h lambda_m F / |F|, the mass costate carried back from the handover.
 
     The rows hold the mass fixed; this term makes the stationarity residual exact (Zhao 2022, eqs 8, 11).
@@ -322,24 +320,22 @@ def _add_mass_gradient(case, plan, point, path, model):
         inverse = model.cone_map[j, 0, 0]
         costate += point.cone_dual[j, 0] * point.y[0] * inverse * inverse
     for k in range(n - 1, -1, -1):
-        F = point.thrust[k]
-        power = 0.0
-        for r in range(plan.n_equal + plan.n_cuts):
-            if model.row_end[r] > k:
-                S = model.row_thrust[r, k]
-                power += point.multiplier[r] * (S[0] * F[0] + S[1] * F[1] + S[2] * F[2])
+        F, pull = point.thrust[k], model.row_pull[k]
+        power = pull[0] * F[0] + pull[1] * F[1] + pull[2] * F[2]
         slope = -power * 2.0 / (path.mass[k] + path.mass[k + 1])
         norm = max(math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), SMALL_THRUST)
-        pull = case.mass_flow * h * (costate + 0.5 * slope) / norm
+        gain = case.mass_flow * h * (costate + 0.5 * slope) / norm
         for i in range(3):
-            model.thrust_gradient[k, i] -= pull * F[i]
+            model.thrust_gradient[k, i] -= gain * F[i]
         costate += slope
     return costate
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def refresh(case, target, plan, cuts, retake, point, path, model):
+def refresh(case, target, plan, cuts, iteration, retake_from, point, path, model):
     """Linearise the whole problem at ``point``: fly it, and fill every row, cone and gradient.
+
+    The tangent planes follow the path from iteration ``retake_from`` on.
 
     Returns
     -------
@@ -369,8 +365,9 @@ def refresh(case, target, plan, cuts, retake, point, path, model):
         model.y_gradient[i] = rho * weight * (2.0 * e + s)
         model.y_gradient[3 + i] = rho * weight * (2.0 * s + e)
     if case.on_ellipsoid:
-        _refresh_handover_on_ellipsoid(case, path, model, point)
-    _refresh_cuts(case, path, model, cuts, plan, retake)
+        _refresh_handover_on_ellipsoid(case, target, model, point)
+    _refresh_cuts(case, path, model, cuts, plan, iteration >= retake_from)
     if case.propellant < 1.0:
         _refresh_propellant(case, point, path, model, plan.n_rows - 1, touchdown_mass)
-    return energy, _add_mass_gradient(case, plan, point, path, model)
+    fill_row_pull(point, model, plan.n_rows)
+    return energy, _add_mass_gradient(case, point, path, model)

@@ -12,33 +12,51 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from landing_cli.reach.scaled_case import ellipsoid_level
+from landing_cli.reach.free_batch import CutBatch
+from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level
+from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
+
+Floats = NDArray[np.float64]
 
 # Closer to the centre than this, the deepest point does not tell which side is shorter.
 UNDECIDED = 0.1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def last_cut_node(case, path):
+def last_cut_node(case, position):
     """Last node that may carry a tangent plane: the handover has a row of its own when on the ellipsoid."""
-    n = path.gradient.shape[0]
+    n = position.shape[0] - 1
     return n - 1 if case.on_ellipsoid else n
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def lowest_level(case, path):
+def lowest_level(case, position):
     """Least |xi| over the nodes of a path that may carry a tangent plane."""
     lowest = 1e9
-    for k in range(1, last_cut_node(case, path) + 1):
-        x = path.position[k]
+    for k in range(1, last_cut_node(case, position) + 1):
+        x = position[k]
         lowest = min(lowest, ellipsoid_level(case, case.node_cos[k], case.node_sin[k], x[0], x[1], x[2]))
     return lowest
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def lowest_level_between(case, thrust, samples):
+    """Least |xi| of an accurate flight of ``thrust``, between the nodes too; fills ``samples``."""
+    steps = samples.shape[0] - 1
+    fly_accurately(case, thrust, samples)
+    lowest = 1e9
+    for row in range(1, steps + 1):
+        angle = case.spin * (row / steps - 1.0)
+        x = samples[row]
+        lowest = min(lowest, ellipsoid_level(case, math.cos(angle), math.sin(angle), x[0], x[1], x[2]))
+    return lowest
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _unit_coordinates(case, k, x, xi):
-    """xi of a solver-axes position at node k."""
+    """Xi of a solver-axes position at node k."""
     c, s = case.node_cos[k], case.node_sin[k]
     xi[0] = (c * x[0] + s * x[1]) * case.inverse_axes[0]
     xi[1] = (c * x[1] - s * x[0]) * case.inverse_axes[1]
@@ -54,12 +72,12 @@ def _plane_normal(case, k, u, normal):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _dip(case, path):
+def _dip(case, position):
     """Nodes before the entry, after the exit, and at the deepest point of a path's dip."""
-    n = last_cut_node(case, path)
+    n = last_cut_node(case, position)
     first, last, deepest, lowest = n, 1, n, 1e9
     for k in range(1, n + 1):
-        x = path.position[k]
+        x = position[k]
         level = ellipsoid_level(case, case.node_cos[k], case.node_sin[k], x[0], x[1], x[2])
         if level < 1.0:
             first, last = min(first, k), k
@@ -69,26 +87,26 @@ def _dip(case, path):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def arc_cuts(case, path, side, cuts):
-    """Fill ``cuts`` along an arc around the ellipsoid; return their number.
+def arc_cuts(case, position, side, node, normal):
+    """Fill tangent planes along an arc around the ellipsoid; return their number.
 
     Parameters
     ----------
     case : ScaledCase
         The case.
-    path : Path
-        A path that enters the ellipsoid.
+    position : (N + 1, 3) float
+        Nodes of a path that enters the ellipsoid, solver axes.
     side : float
         +1 to pass on the side of the path's deepest point, -1 on the other.
-    cuts : Cuts
-        Room for one cut a node.
+    node, normal : (C,) int, (C, 3) float
+        Filled: the planes' nodes and normals.
     """
-    n = last_cut_node(case, path)
-    before, after, deepest = _dip(case, path)
+    n = last_cut_node(case, position)
+    before, after, deepest = _dip(case, position)
     start, end, middle = np.empty(3), np.empty(3), np.empty(3)
-    _unit_coordinates(case, before, path.position[before], start)
-    _unit_coordinates(case, after, path.position[after], end)
-    _unit_coordinates(case, deepest, path.position[deepest], middle)
+    _unit_coordinates(case, before, position[before], start)
+    _unit_coordinates(case, after, position[after], end)
+    _unit_coordinates(case, deepest, position[deepest], middle)
     along = end - start
     along /= max(math.sqrt(np.sum(along * along)), 1e-12)
     out = middle - np.sum(middle * along) * along
@@ -103,37 +121,61 @@ def arc_cuts(case, path, side, cuts):
     for k in range(max(1, before - 1), min(n, after + 1) + 1):
         if before <= k <= after:
             phi = angle + sweep * (k - before) / max(1, after - before)
-            _plane_normal(case, k, math.cos(phi) * out + math.sin(phi) * along, cuts.normal[count])
+            _plane_normal(case, k, math.cos(phi) * out + math.sin(phi) * along, normal[count])
         else:
-            _unit_coordinates(case, k, path.position[k], middle)
-            _plane_normal(case, k, middle / math.sqrt(np.sum(middle * middle)), cuts.normal[count])
-        cuts.node[count] = k
+            _unit_coordinates(case, k, position[k], middle)
+            _plane_normal(case, k, middle / math.sqrt(np.sum(middle * middle)), normal[count])
+        node[count] = k
         count += 1
     return count
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def freeze_on_path(case, path, cuts, count, level):
-    """Move the cuts to the current path and add a cut wherever a node is below ``level``.
-
-    Returns
-    -------
-    count, added : int
-    """
+def freeze_on_path(case, position, node, normal, count, level):
+    """Move the planes to a path, add one wherever a node is below ``level``; return their number."""
     xi = np.empty(3)
-    added = 0
-    for k in range(1, last_cut_node(case, path) + 1):
-        x = path.position[k]
+    for k in range(1, last_cut_node(case, position) + 1):
+        x = position[k]
         if ellipsoid_level(case, case.node_cos[k], case.node_sin[k], x[0], x[1], x[2]) < level:
             known = False
             for c in range(count):
-                known = known or cuts.node[c] == k
+                known = known or node[c] == k
             if not known:
-                cuts.node[count] = k
+                node[count] = k
                 count += 1
-                added += 1
     for c in range(count):
-        k = cuts.node[c]
-        _unit_coordinates(case, k, path.position[k], xi)
-        _plane_normal(case, k, xi / math.sqrt(np.sum(xi * xi)), cuts.normal[c])
-    return count, added
+        k = node[c]
+        _unit_coordinates(case, k, position[k], xi)
+        _plane_normal(case, k, xi / math.sqrt(np.sum(xi * xi)), normal[c])
+    return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def lowest_levels(case: ScaledCase, positions: Floats, out: Floats) -> None:
+    """Fill (n,) least |xi| over the nodes of (n, N + 1, 3) paths."""
+    for i in range(positions.shape[0]):
+        out[i] = lowest_level(case, positions[i])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def lowest_levels_between(case: ScaledCase, thrusts: Floats, out: Floats) -> None:
+    """Fill (n,) least |xi| of accurate flights of (n, N, 3) thrusts, between the nodes too."""
+    samples = np.empty((thrusts.shape[1] * SUBSTEPS + 1, 7))
+    for i in range(thrusts.shape[0]):
+        out[i] = lowest_level_between(case, thrusts[i], samples)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def arc_cuts_many(case: ScaledCase, positions: Floats, side: float, cuts: CutBatch) -> None:
+    """Fill the planes of a batch along arcs on one side of the ellipsoid; see :func:`arc_cuts`."""
+    for i in range(positions.shape[0]):
+        cuts.count[i] = arc_cuts(case, positions[i], side, cuts.node[i], cuts.normal[i])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def freeze_many(case: ScaledCase, positions: Floats, levels: Floats, cuts: CutBatch) -> None:
+    """Move the planes of a batch to its paths; see :func:`freeze_on_path`."""
+    for i in range(positions.shape[0]):
+        cuts.count[i] = freeze_on_path(
+            case, positions[i], cuts.node[i], cuts.normal[i], cuts.count[i], levels[i]
+        )

@@ -13,32 +13,38 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.body.adjacency import mean_edge_m
 from landing_cli.body.bvh import SurfaceIndex, build_surface_index
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.reach.certificate import arc_gravity, gravity_tube
-from landing_cli.reach.delivery import LIMIT_TOLERANCE, SUBSTEPS, Frame, deliver
-from landing_cli.reach.final_stage import ARC_SAMPLES
-from landing_cli.reach.free_facet import best_flight
-from landing_cli.reach.free_solve import CERTIFIED, CONVERGED, new_solver
+from landing_cli.reach.delivery import VALUE_COLUMNS, Frame, deliver_many, new_deliveries
+from landing_cli.reach.free_batch import Batch
+from landing_cli.reach.free_flights import Question, best_flights
+from landing_cli.reach.free_solve import CERTIFIED, CONVERGED, STALLED
 from landing_cli.reach.records import Binding, FacetSolutions, LandingCase, Verdict, blank_rows
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 INTERVALS = 40
-FINE_INTERVALS = 160
+FINE_INTERVALS = 100
 # A thrust level below this on the coarse grid may be below 1 on the fine one (its bias is a few 1e-3).
-DOUBTFUL_LEVEL = 1.02
+DOUBTFUL_LEVEL = 1.006
 
-_UNRESOLVED, _REACHABLE, _UNREACHABLE = (int(v) for v in Verdict)
-_THRUST, _ELLIPSOID, _TERRAIN = int(Binding.THRUST), int(Binding.ELLIPSOID), int(Binding.TERRAIN)
-_NONE = int(Binding.NONE)
+# Relative to J, a constraint whose loosening would gain less than this does not bind.
 SLIGHT_PRESSURE = 1e-5
+# Columns that belong to a flight and stay NaN where there is none.
+PATH_COLUMNS = (
+    *(name for name in VALUE_COLUMNS if name != "violation"),
+    "handover_position_m",
+    "handover_velocity_m_s",
+    "handover_mass_kg",
+    "costates",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,35 +61,6 @@ class PreparedCase:
     surface: SurfaceIndex
     centroids_m: Floats
     normals: Floats
-
-
-class Measures(NamedTuple):
-    """Answers of a batch of facets, by column; see records.FACET_COLUMNS."""
-
-    verdict: Ints
-    proved: Ints
-    binding: Ints
-    iterations: Ints
-    values: Floats  # (n, 11) in the order of VALUE_COLUMNS
-    handover: Floats  # (n, 7) position, velocity, mass
-    costates: Floats  # (n, 7)
-    thrust: Floats  # (n, N, 3) scaled
-
-
-VALUE_COLUMNS = (
-    "performance_index_m2_s3",
-    "delta_v_m_s",
-    "fuel_kg",
-    "peak_thrust_ratio",
-    "peak_thrust_ratio_descent",
-    "peak_thrust_ratio_final",
-    "ellipsoid_margin",
-    "glide_slope_margin_deg",
-    "terrain_clearance_min_m",
-    "violation",
-    "thrust_margin",
-)
-_VIOLATION, _THRUST_MARGIN = VALUE_COLUMNS.index("violation"), VALUE_COLUMNS.index("thrust_margin")
 
 
 def prepare(case: LandingCase) -> PreparedCase:
@@ -115,151 +92,137 @@ def prepare(case: LandingCase) -> PreparedCase:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _strongest(pressure, energy):
-    """The constraint with the largest pressure, or none where all are slight."""
-    binding, largest = _NONE, SLIGHT_PRESSURE * energy
-    for i in range(pressure.shape[0]):
-        if pressure[i] > largest:
-            binding, largest = i + 1, pressure[i]
-    return binding
+class Work(NamedTuple):
+    """A batch of facets on one time grid: the question, and the answers so far."""
+
+    question: Question
+    rows: NDArray[np.void]
+    thrust: Floats  # (n, N, 3) scaled
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _record(i, case, frame, surface, solver, energy, target_m, normal, must_clear, scratch, out):
-    """Deliver the solver's answer for row i; return whether it meets every limit."""
-    samples, path_m, handover = scratch
-    d = deliver(case, frame, surface, solver.answer.thrust, target_m, normal, samples, path_m, handover)
-    v = out.values[i]
-    v[0], v[1], v[2] = d.performance_index_m2_s3, d.delta_v_m_s, d.fuel_kg
-    v[3], v[4], v[5] = max(d.peak_descent, d.peak_final), d.peak_descent, d.peak_final
-    v[6], v[7], v[8] = d.ellipsoid_margin, math.degrees(d.glide_slope_margin_rad), d.terrain_clearance_m
-    violation = 0.0 if d.violation <= LIMIT_TOLERANCE else d.violation
-    out.binding[i] = _strongest(solver.answer.pressure, energy)
-    if must_clear and d.terrain_clearance_m < 0.0:
-        violation = max(violation, -d.terrain_clearance_m / case.length_m)
-        out.binding[i] = _TERRAIN
-    v[_VIOLATION] = violation
-    out.handover[i, :6] = handover
-    out.handover[i, 6] = d.handover_mass_kg
-    out.costates[i] = solver.answer.costates
-    out.thrust[i] = solver.answer.thrust
-    return violation == 0.0
+def _new_work(prepared: PreparedCase, scaled: ScaledCase, tube: Floats, facets: Ints) -> Work:
+    targets, normals = prepared.centroids_m[facets] / scaled.length_m, prepared.normals[facets]
+    question = Question(scaled, targets, normals, False, tube, prepared.arc_bound)
+    return Work(question, blank_rows(facets), np.zeros((len(facets), len(scaled.mid_cos), 3)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _judge_by_margin(i, case, frame, surface, solver, bounds, target, geometry, must_clear, scratch, out):
-    """Row i by its least thrust level, where the least-energy solve gave neither flight nor proof."""
-    target_m, normal = geometry
-    found = best_flight(case, target, normal, True, bounds[0], bounds[1], solver)
-    out.iterations[i] += found.iterations
-    if found.status != CONVERGED:
+def _by_energy(prepared: PreparedCase, work: Work, chosen: Ints) -> None:
+    """Ask for the least-energy flight: a flight, a proof that there is none, or neither."""
+    flights, around = best_flights(_ask(work, chosen, False))
+    rows = work.rows
+    rows["iterations"][chosen] += flights.iterations
+    certified = chosen[flights.status == CERTIFIED]
+    rows["verdict"][certified] = Verdict.UNREACHABLE
+    rows["proved"][certified] = 1
+    rows["binding"][certified] = Binding.THRUST
+    rows["violation"][certified] = flights.bound[flights.status == CERTIFIED] - 1.0
+    # a free flight that dips into the ellipsoid meets the thrust bound: what stops it is the ellipsoid
+    rows["binding"][chosen[around]] = Binding.ELLIPSOID
+    _deliver(prepared, work, chosen, flights)
+
+
+def _by_margin(prepared: PreparedCase, work: Work, chosen: Ints) -> None:
+    """Ask for the least thrust level: above 1 the facet is unreachable."""
+    if len(chosen) == 0:
         return
-    out.values[i, _THRUST_MARGIN] = 1.0 - found.level
-    if found.level > 1.0:
-        out.verdict[i] = _UNREACHABLE
-        out.proved[i] = 1 if found.bound > 1.0 else 0
-        out.values[i, _VIOLATION] = found.level - 1.0
-        out.binding[i] = _ELLIPSOID if found.cuts > 0 else _THRUST
-    elif _record(i, case, frame, surface, solver, 1.0, target_m, normal, must_clear, scratch, out):
-        out.verdict[i] = _REACHABLE
+    flights, around = best_flights(_ask(work, chosen, True))
+    rows = work.rows
+    rows["iterations"][chosen] += flights.iterations
+    solved = flights.status == CONVERGED
+    rows["thrust_margin"][chosen[solved]] = 1.0 - flights.level[solved]
+    short = solved & (flights.level > 1.0)
+    rows["verdict"][chosen[short]] = Verdict.UNREACHABLE
+    rows["proved"][chosen[short]] = flights.bound[short] > 1.0
+    rows["violation"][chosen[short]] = flights.level[short] - 1.0
+    by_ellipsoid = short & (around | (rows["binding"][chosen] == Binding.ELLIPSOID)) & (flights.bound <= 1.0)
+    rows["binding"][chosen[short]] = Binding.THRUST
+    rows["binding"][chosen[by_ellipsoid]] = Binding.ELLIPSOID
+    flights.status[short] = STALLED
+    _deliver(prepared, work, chosen, flights)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def judge_facets(case, frame, surface, tube, arc_bound, targets_m, normals, must_clear, out):
-    """Verdicts and flights of a batch of facets, filled into ``out``.
-
-    Parameters
-    ----------
-    case, frame, surface : ScaledCase, Frame, SurfaceIndex
-        The case and the asteroid's surface.
-    tube, arc_bound : (N,) float, float
-        Bounds of gravity for the certificate.
-    targets_m, normals : (n, 3) float
-        Facet centroids (m) and outward unit normals, body axes.
-    must_clear : bool
-        Whether a path that cuts the mesh is refused.
-    out : Measures
-        Filled; float values are NaN on entry.
-    """
-    n = case.mid_cos.shape[0]
-    solver = new_solver(case)
-    steps = n * SUBSTEPS + 1
-    scratch = (np.empty((steps, 7)), np.empty((steps + ARC_SAMPLES, 3)), np.empty(6))
-    for i in range(targets_m.shape[0]):
-        target, normal = targets_m[i] / case.length_m, normals[i]
-        found = best_flight(case, target, normal, False, tube, arc_bound, solver)
-        out.iterations[i] = found.iterations
-        if found.status == CERTIFIED:
-            out.verdict[i], out.proved[i], out.binding[i] = _UNREACHABLE, 1, _THRUST
-            out.values[i, _VIOLATION] = found.bound - 1.0
-            continue
-        if found.status == CONVERGED:
-            if _record(
-                i, case, frame, surface, solver, found.energy, targets_m[i], normal, must_clear, scratch, out
-            ):
-                out.verdict[i] = _REACHABLE
-                continue
-            if out.binding[i] == _TERRAIN:
-                out.verdict[i] = _UNREACHABLE
-                continue
-        geometry = (targets_m[i], normal)
-        bounds = (tube, arc_bound)
-        _judge_by_margin(i, case, frame, surface, solver, bounds, target, geometry, must_clear, scratch, out)
-
-
-def _judge(prepared: PreparedCase, scaled: ScaledCase, tube: Floats, facets: Ints) -> Measures:
-    """Run the kernel on some facets on one time grid."""
-    n = len(facets)
-    out = Measures(
-        np.zeros(n, dtype=np.int64),
-        np.zeros(n, dtype=np.int64),
-        np.zeros(n, dtype=np.int64),
-        np.zeros(n, dtype=np.int64),
-        np.full((n, len(VALUE_COLUMNS)), np.nan),
-        np.full((n, 7), np.nan),
-        np.full((n, 7), np.nan),
-        np.zeros((n, len(scaled.mid_cos), 3)),
+def _ask(work: Work, chosen: Ints, tau_free: bool) -> Question:
+    question = work.question
+    return question._replace(
+        targets=question.targets[chosen], normals=question.normals[chosen], tau_free=tau_free
     )
-    judge_facets(
+
+
+def _on_coarse_grid(prepared: PreparedCase, facets: Ints) -> Work:
+    """Judge facets on the coarse grid: by energy, and by margin what that leaves open."""
+    work = _new_work(prepared, prepared.coarse, prepared.coarse_tube, facets)
+    _by_energy(prepared, work, np.arange(len(facets)))
+    _by_margin(prepared, work, np.flatnonzero(work.rows["verdict"] == Verdict.UNRESOLVED))
+    return work
+
+
+def _on_fine_grid(prepared: PreparedCase, facets: Ints) -> Work:
+    """Judge doubtful facets on the fine grid: by margin first, then the best flight where there is one."""
+    work = _new_work(prepared, prepared.fine, prepared.fine_tube, facets)
+    everything = np.arange(len(facets))
+    _by_margin(prepared, work, everything)
+    _by_energy(prepared, work, everything[work.rows["verdict"] != Verdict.UNREACHABLE])
+    return work
+
+
+def _deliver(prepared: PreparedCase, work: Work, chosen: Ints, flights: Batch) -> None:
+    """Fly the converged flights accurately and fill their rows; reachable is what meets every limit."""
+    found = np.flatnonzero(flights.status == CONVERGED)
+    places, rows, scaled = chosen[found], work.rows, work.question.case
+    if len(found) == 0:
+        return
+    facets = rows["facet"][places]
+    out = new_deliveries(len(places))
+    deliver_many(
         scaled,
         prepared.frame,
         prepared.surface,
-        tube,
-        prepared.arc_bound,
+        flights.thrust[found],
         prepared.centroids_m[facets],
         prepared.normals[facets],
-        prepared.case.terrain == "require",
         out,
     )
-    return out
-
-
-def _to_rows(prepared: PreparedCase, facets: Ints, out: Measures) -> FacetSolutions:
-    """Turn the kernel's answers into rows; only a reachable facet's thrust is kept."""
-    rows = blank_rows(facets)
-    for name in ("verdict", "proved", "binding", "iterations"):
-        rows[name] = getattr(out, name)
+    work.thrust[places] = flights.thrust[found]
     for column, name in enumerate(VALUE_COLUMNS):
-        rows[name] = out.values[:, column]
-    rows["handover_position_m"] = out.handover[:, :3]
-    rows["handover_velocity_m_s"] = out.handover[:, 3:6]
-    rows["handover_mass_kg"] = out.handover[:, 6]
-    rows["costates"] = out.costates
-    reachable = out.verdict == _REACHABLE
-    for name in (*VALUE_COLUMNS[:_VIOLATION], "handover_position_m", "handover_velocity_m_s", "costates"):
+        rows[name][places] = out.values[:, column]
+    rows["handover_position_m"][places] = out.handover[:, :3]
+    rows["handover_velocity_m_s"][places] = out.handover[:, 3:6]
+    rows["handover_mass_kg"][places] = out.handover[:, 6]
+    rows["costates"][places] = flights.costates[found]
+    rows["binding"][places] = _binding(flights.pressure[found], flights.energy[found])
+    met = rows["violation"][places] == 0.0
+    rows["verdict"][places[met]] = Verdict.REACHABLE
+    if prepared.case.terrain == "require":
+        depth = -rows["terrain_clearance_min_m"][places]
+        cuts = met & (depth > 0.0)
+        rows["verdict"][places[cuts]] = Verdict.UNREACHABLE
+        rows["binding"][places[cuts]] = Binding.TERRAIN
+        rows["violation"][places[cuts]] = depth[cuts] / scaled.length_m
+
+
+def _binding(pressure: Floats, energy: Floats) -> Ints:
+    """The constraint with the largest pressure, or none where all are slight."""
+    strongest = np.argmax(pressure, axis=1)
+    largest = np.take_along_axis(pressure, strongest[:, None], 1)[:, 0]
+    return np.where(largest <= SLIGHT_PRESSURE * energy, int(Binding.NONE), strongest + 1)
+
+
+def _solutions(prepared: PreparedCase, work: Work) -> FacetSolutions:
+    """Keep flights of reachable facets only: elsewhere the path's columns are NaN."""
+    rows = work.rows
+    reachable = rows["verdict"] == Verdict.REACHABLE
+    for name in PATH_COLUMNS:
         rows[name][~reachable] = np.nan
-    rows["handover_mass_kg"][~reachable] = np.nan
-    rows["thrust_nodes"] = np.where(reachable, out.thrust.shape[1], 0)
-    nodes = out.thrust[reachable].reshape(-1, 3) * prepared.frame.thrust_max_n
+    rows["thrust_nodes"] = np.where(reachable, work.thrust.shape[1], 0)
+    nodes = work.thrust[reachable].reshape(-1, 3) * prepared.frame.thrust_max_n
     return FacetSolutions(rows, nodes)
 
 
-def _doubtful(out: Measures) -> NDArray[np.bool_]:
+def _doubtful(rows: NDArray[np.void]) -> Ints:
     """Rows that a finer time grid may decide otherwise."""
-    level = 1.0 - out.values[:, _THRUST_MARGIN]
-    near = (out.verdict == _UNREACHABLE) & (out.proved == 0) & (level < DOUBTFUL_LEVEL)
-    return near | (out.verdict == _UNRESOLVED)
+    near = (rows["verdict"] == Verdict.UNREACHABLE) & (rows["proved"] == 0)
+    near &= (rows["violation"] < DOUBTFUL_LEVEL - 1.0) & (rows["binding"] != Binding.TERRAIN)
+    return np.flatnonzero(near | (rows["verdict"] == Verdict.UNRESOLVED))
 
 
 def solve_prepared(prepared: PreparedCase, facets: NDArray[np.integer]) -> FacetSolutions:
@@ -278,15 +241,13 @@ def solve_prepared(prepared: PreparedCase, facets: NDArray[np.integer]) -> Facet
         One row a facet, in the order given.
     """
     indices = np.asarray(facets, dtype=np.int64)
-    out = _judge(prepared, prepared.coarse, prepared.coarse_tube, indices)
-    solutions = _to_rows(prepared, indices, out)
-    doubtful = np.flatnonzero(_doubtful(out))
-    if len(doubtful) == 0:
+    coarse = _on_coarse_grid(prepared, indices)
+    again = _doubtful(coarse.rows)
+    solutions = _solutions(prepared, coarse)
+    if len(again) == 0:
         return solutions
-    finer = _to_rows(
-        prepared, indices[doubtful], _judge(prepared, prepared.fine, prepared.fine_tube, indices[doubtful])
-    )
-    return replace_rows(solutions, doubtful, finer)
+    finer = _solutions(prepared, _on_fine_grid(prepared, indices[again]))
+    return replace_rows(solutions, again, finer)
 
 
 def replace_rows(solutions: FacetSolutions, places: Ints, better: FacetSolutions) -> FacetSolutions:

@@ -18,6 +18,9 @@ from landing_cli.reach.scaled_case import gravity_and_gradient, gravity_at_angle
 
 Floats = NDArray[np.float64]
 
+# Steps in each interval of an accurate flight.
+SUBSTEPS = 2
+
 
 class Path(NamedTuple):
     """A descent flown through N intervals (scaled units, solver axes)."""
@@ -128,8 +131,8 @@ def pull_back(path, end, p0, p1, p2, q0, q1, q2, row):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fly_accurately(case, thrust, substeps, samples):
-    """Fly the descent stage by Runge-Kutta 4, with exact mass, ``substeps`` steps an interval.
+def fly_accurately(case, thrust, samples):
+    """Fly the descent stage by Runge-Kutta 4, with exact mass, in the same number of steps an interval.
 
     Parameters
     ----------
@@ -137,12 +140,11 @@ def fly_accurately(case, thrust, substeps, samples):
         The case.
     thrust : (N, 3) float
         Constant within each interval, solver axes.
-    substeps : int
-        Steps in each interval.
-    samples : (N substeps + 1, 7) float
+    samples : (N steps + 1, 7) float
         Filled with position, velocity (solver axes) and mass at the step ends.
     """
     n = thrust.shape[0]
+    substeps = (samples.shape[0] - 1) // n
     h = 1.0 / (n * substeps)
     s = np.empty(7)
     for i in range(3):
@@ -189,7 +191,7 @@ def measure_defect(case, thrust, path):
     n = thrust.shape[0]
     path.defect[:] = 0.0
     fly(case, thrust, path)
-    fly_accurately(case, thrust, 1, path.samples)
+    fly_accurately(case, thrust, path.samples)
     for i in range(3):
         path.defect[i] = path.samples[n, i] - path.position[n, i]
         path.defect[3 + i] = path.samples[n, 3 + i] - path.velocity[n, i]

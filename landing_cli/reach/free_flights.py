@@ -1,0 +1,150 @@
+"""The best flight to each facet of a batch: free, or around the keep-out ellipsoid on either side."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from landing_cli.reach.ellipsoid_arcs import (
+    UNDECIDED,
+    arc_cuts_many,
+    freeze_many,
+    lowest_levels,
+    lowest_levels_between,
+)
+from landing_cli.reach.free_batch import Batch, CutBatch, new_batch, no_cuts, solve_many
+from landing_cli.reach.free_solve import CONVERGED, STALLED
+from landing_cli.reach.scaled_case import ScaledCase
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+NEVER = 1 << 30
+FREE_LIMIT, CUT_LIMIT = 40, 36
+RETAKE_FROM = 5
+ENERGY_ONLY, MARGIN_WEIGHT = 1.0, 1e-3
+TOUCH = 1.0 - 1e-6
+# |xi| that the tangent planes keep at first. Where a path still dips between two nodes by more than DIP,
+# its planes are raised by the dip and the facet is solved again, at most RAISES times.
+CUT_LEVEL, RAISES, DIP = 1.0 + 2e-4, 4, 3e-6
+
+
+class Question(NamedTuple):
+    """What is asked of a batch of facets."""
+
+    case: ScaledCase
+    targets: Floats  # (n, 3) scaled
+    normals: Floats  # (n, 3)
+    tau_free: bool  # least thrust level instead of least J
+    tube: Floats
+    arc_bound: float
+
+
+def best_flights(question: Question) -> tuple[Batch, Flags]:
+    """Find the best flight to every facet of a batch.
+
+    Parameters
+    ----------
+    question : Question
+        Case, facets and objective.
+
+    Returns
+    -------
+    flights : Batch
+        CONVERGED where a flight was found; else how the solve ended.
+    around : (n,) bool
+        Whether the free flight dips into the ellipsoid, so that the answer leads around it.
+    """
+    n, intervals = len(question.targets), len(question.case.mid_cos)
+    best = _solve(question, no_cuts(n, intervals), np.full(n, CUT_LEVEL), NEVER, FREE_LIMIT)
+    lowest = np.empty(n)
+    lowest_levels(question.case, best.position, lowest)
+    around = (best.status == CONVERGED) & (lowest < TOUCH)
+    todo = np.flatnonzero(around)
+    free_position = best.position[todo].copy()
+    best.status[todo] = STALLED
+    value = np.full(n, np.inf)
+    second = np.ones(len(todo), dtype=bool)
+    for side in (1.0, -1.0):
+        chosen = todo[second]
+        flights, froze = _around(_subset(question, chosen), free_position[second], side)
+        best.iterations[chosen] += flights.iterations
+        found = flights.level if question.tau_free else flights.energy
+        better = (flights.status == CONVERGED) & (found < value[chosen])
+        value[chosen[better]] = found[better]
+        _take(best, chosen[better], flights, np.flatnonzero(better))
+        # the other side is worth a look where this one was a close call or a struggle
+        second[second] = froze
+        second |= lowest[todo] < UNDECIDED
+    return best, around
+
+
+def _around(question: Question, free_position: Floats, side: float) -> tuple[Batch, Flags]:
+    """Solve a batch with tangent planes that follow the path, then frozen, then raised over dips."""
+    case = question.case
+    n, intervals = len(question.targets), len(case.mid_cos)
+    cuts = no_cuts(n, intervals)
+    arc_cuts_many(case, free_position, side, cuts)
+    level = np.full(n, CUT_LEVEL)
+    flights = _solve(question, cuts, level, RETAKE_FROM, CUT_LIMIT)
+    froze = flights.status == STALLED
+    stalled = np.flatnonzero(froze)
+    _solve_again(question, flights, cuts, np.full(n, TOUCH), level, stalled)
+    changed = np.flatnonzero(flights.status == CONVERGED)
+    for _ in range(RAISES):
+        lowest = np.empty(len(changed))
+        lowest_levels_between(case, flights.thrust[changed], lowest)
+        dips = 1.0 - lowest > DIP
+        changed = changed[dips]
+        level[changed] += 1.1 * (1.0 - lowest[dips])
+        _solve_again(question, flights, cuts, level, level, changed)
+        changed = changed[flights.status[changed] == CONVERGED]
+    return flights, froze
+
+
+def _solve_again(
+    question: Question, flights: Batch, cuts: CutBatch, touch: Floats, level: Floats, chosen: Ints
+) -> None:
+    """Solve chosen facets again with planes frozen on their paths, updating flights and cuts."""
+    if len(chosen) == 0:
+        return
+    part = CutBatch(cuts.count[chosen], cuts.node[chosen], cuts.normal[chosen])
+    freeze_many(question.case, flights.position[chosen], touch[chosen], part)
+    again = _solve(_subset(question, chosen), part, level[chosen], NEVER, CUT_LIMIT)
+    again.iterations[:] += flights.iterations[chosen]
+    _take(flights, chosen, again, np.arange(len(chosen)))
+    flights.iterations[chosen] = again.iterations
+    cuts.count[chosen], cuts.node[chosen], cuts.normal[chosen] = part
+
+
+def _solve(question: Question, cuts: CutBatch, level: Floats, retake_from: int, limit: int) -> Batch:
+    """Run the kernel on a whole batch."""
+    out = new_batch(len(question.targets), len(question.case.mid_cos))
+    solve_many(
+        question.case,
+        question.targets,
+        question.normals,
+        cuts,
+        level,
+        MARGIN_WEIGHT if question.tau_free else ENERGY_ONLY,
+        question.tau_free,
+        retake_from,
+        limit,
+        question.tube,
+        question.arc_bound,
+        out,
+    )
+    return out
+
+
+def _subset(question: Question, chosen: Ints) -> Question:
+    return question._replace(targets=question.targets[chosen], normals=question.normals[chosen])
+
+
+def _take(into: Batch, places: Ints, source: Batch, rows: Ints) -> None:
+    """Copy rows of one batch into places of another; iterations and free bounds stay."""
+    for name in ("status", "energy", "level", "thrust", "position", "costates", "pressure"):
+        getattr(into, name)[places] = getattr(source, name)[rows]
