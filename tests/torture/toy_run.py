@@ -67,7 +67,7 @@ def run(arguments: Sequence[str]) -> int:
         guard.tell(f"{choices.output} is up to date")
         return 0
     guard.hint_on_interrupt("continue with --resume")
-    plan = WorkPlan(choices.jobs, choices.backend)
+    plan = WorkPlan(choices.jobs, choices.backend, choices.scheduler)
     chunks = [np.arange(i, i + CHUNK_FACETS) for i in range(0, FACETS, CHUNK_FACETS)]
     with journal:
         cases = []
@@ -91,6 +91,7 @@ def _choices(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--force", action="store_true")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--backend", default="threads")
+    parser.add_argument("--scheduler")
     parser.add_argument("--trace", type=Path)
     parser.add_argument("--deadly", type=int)
     return parser.parse_args(arguments)

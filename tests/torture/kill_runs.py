@@ -1,0 +1,144 @@
+"""Runs killed at random instants, resumed, and compared with the undisturbed one."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+from programs import Reference, Tally, environment, trace_of
+
+from landing_cli.errors import InputRefused
+from landing_cli.results.journal import read_journal
+from landing_cli.results.output import journal_path
+from landing_cli.results.store import read
+
+SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+ANSWERED = {signal.SIGINT: 130, signal.SIGTERM: 143}
+ANSWER_S, ORPHANS_S = 2.0, 4.0
+START_UP_S = 0.3  # before this, the interpreter may not yet have reached our first line
+JOBS = 2
+
+
+def kill_runs(reference: Reference, kills: int, folder: Path, seed: int = 0) -> list[Tally]:
+    """Kill runs on threads and on loky, by turns with every signal to the group or to the parent alone."""
+    chance = random.Random(seed)
+    tallies = {b: Tally(f"{reference.program.name}: kills, {b}") for b in reference.seconds}
+    for number in range(kills):
+        backend = list(tallies)[number % len(tallies)]
+        number_of_pair = number // len(tallies)
+        caught = SIGNALS[number_of_pair % 4]
+        whole_group = bool(number_of_pair // 4 % 2)
+        after = chance.uniform(0.05, 1.1 * reference.seconds[backend])
+        target = "group" if whole_group else "parent"
+        output = folder / f"kill-{number}" / "run.h5"
+        complaints = _kill_once(reference, output, backend, caught, whole_group, after)
+        tallies[backend].record(f"{caught.name} to the {target} after {after:.2f} s", complaints)
+    return list(tallies.values())
+
+
+def _kill_once(
+    reference: Reference, output: Path, backend: str, caught: signal.Signals, whole_group: bool, after: float
+) -> list[str]:
+    output.parent.mkdir(parents=True)
+    process = subprocess.Popen(
+        reference.program.command(output, backend, JOBS),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+        start_new_session=True,
+    )
+    try:
+        process.wait(timeout=after)
+    except subprocess.TimeoutExpired:
+        (os.killpg if whole_group else os.kill)(process.pid, caught)
+    killed = time.monotonic()
+    assert process.stderr is not None
+    told = process.stderr.read()  # until the last process that holds it is gone
+    code = process.wait()
+    complaints = _answer(code, caught, time.monotonic() - killed, told, after, output)
+    complaints += _orphans(process.pid, killed)
+    recorded, wrong = _on_disk(output)
+    complaints += wrong + _solved_again(reference, output, recorded)
+    before = _traced(output)
+    complaints += reference.resumed(output, backend)
+    twice = set(recorded) & set(_traced(output)[len(before) :])
+    return complaints + ([f"recorded chunks solved again: {sorted(twice)}"] if twice else [])
+
+
+def _answer(
+    code: int, caught: signal.Signals, seconds: float, told: str, after: float, output: Path
+) -> list[str]:
+    """A run that is asked to stop says so in one line, with its code, in time."""
+    lines = told.strip().splitlines()
+    complaints = ["a traceback"] if "Traceback" in told and after > START_UP_S else []
+    if code == 0 or caught not in ANSWERED:
+        return complaints
+    if code != ANSWERED[caught] and after > START_UP_S:
+        complaints.append(f"exit code {code}: {told.strip()[-200:]}")
+    if seconds > ANSWER_S:
+        complaints.append(f"took {seconds:.1f} s to end")
+    if journal_path(output).exists() and not (lines and "--resume" in lines[-1]):
+        complaints.append(f"does not tell of --resume: {lines[-1:]}")
+    return complaints
+
+
+def _orphans(session: int, killed: float) -> list[str]:
+    alive: list[str] = []
+    while time.monotonic() < killed + ORPHANS_S:
+        alive = [name for pid, name in _session_members(session)]
+        if not alive:
+            return []
+        time.sleep(0.05)
+    return [f"orphans after {ORPHANS_S} s: {alive}"]
+
+
+def _session_members(session: int) -> list[tuple[int, str]]:
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                state, *fields = (entry / "stat").read_text().rsplit(")", 1)[1].split()
+                name = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+            except OSError:
+                continue
+            if state != "Z" and int(fields[2]) == session:
+                found.append((int(entry.name), name))
+    return found
+
+
+def _on_disk(output: Path) -> tuple[list[str], list[str]]:
+    """Return the chunks that the journal holds, and what is wrong with result or journal."""
+    wrong = []
+    if output.exists():
+        try:
+            read(output)
+        except InputRefused as error:
+            wrong.append(f"unreadable result: {error}")
+    try:
+        content = read_journal(journal_path(output))
+    except InputRefused as error:
+        return [], [*wrong, f"unreadable journal: {error}"]
+    return list(content.records) if content else [], wrong
+
+
+def _traced(output: Path) -> list[str]:
+    """Chunks that the solver finished, in the journal's words; only the toy tells."""
+    trace = trace_of(output)
+    if not trace.exists():
+        return []
+    from toy_run import CASES
+
+    pairs = (line.split("/") for line in trace.read_text().split())
+    return [f"{CASES[int(seed)]}/{first}" for seed, first in pairs]
+
+
+def _solved_again(reference: Reference, output: Path, recorded: list[str]) -> list[str]:
+    if not reference.program.traces or output.exists():
+        return []
+    again = len(set(_traced(output)) - set(recorded))
+    return [f"{again} chunks to solve again"] if again > 2 * JOBS else []
