@@ -10,9 +10,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent / "torture"))
 
-from kill_runs import kill_runs  # noqa: E402
-from kill_workers import deadly_facet, kill_workers  # noqa: E402
-from programs import TOY, Reference  # noqa: E402
+from kill_runs import kill_runs
+from kill_workers import deadly_facet, kill_workers
+from programs import TOY, Reference
 
 pytestmark = pytest.mark.slow
 
