@@ -16,50 +16,60 @@ from above. The keep-out ellipsoid is left out: what it alone forbids is not pro
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from landing_cli.body.gravity.bounds import largest_acceleration_on_ellipsoid, largest_acceleration_outside
+from landing_cli.body.asteroid import Asteroid
+from landing_cli.body.gravity.bounds import largest_acceleration_outside
 from landing_cli.body.gravity.field_values import accelerations
-from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, gravity_on_arc
 
 Floats = NDArray[np.float64]
 
-TUBE_SHELLS = 16
+# Shells around the ellipsoid, up to this multiple of its least semi-axis.
+SHELLS, FARTHEST_SHELL = 12, 6.0
 
 
-def gravity_tube(case: LandingCase, scaled: ScaledCase) -> Floats:
+class GravityBounds(NamedTuple):
+    """Upper bounds of gravity around an asteroid, m/s2; they depend on nothing else."""
+
+    radius_m: Floats  # (S,) ascending
+    outside_m_s2: Floats  # (S,) beyond each radius and outside the keep-out ellipsoid
+    on_arcs_m_s2: float  # on and above the surface, where the final arcs fly
+
+
+def gravity_bounds(asteroid: Asteroid, ellipsoid_m: Floats) -> GravityBounds:
+    """Bound gravity outside the keep-out ellipsoid, by distance, and on the surface."""
+    radii = np.min(ellipsoid_m) * np.geomspace(1.0, FARTHEST_SHELL, SHELLS)
+    at_vertices = np.linalg.norm(accelerations(asteroid.gravity, asteroid.mesh.vertices), axis=1)
+    return GravityBounds(
+        radii,
+        largest_acceleration_outside(asteroid.gravity, radii, ellipsoid_m),
+        # |g| is largest on the surface, and a facet lies only a little below its corners
+        float(1.02 * at_vertices.max()),
+    )
+
+
+def gravity_tube(scaled: ScaledCase, bounds: GravityBounds) -> Floats:
     """Upper bounds of gravity along the descent stage, (N,), scaled.
 
     In interval k no flight with full thrust can be nearer to the centre than its drift without forces
     minus (1/m + g) t^2 / 2, nor inside the keep-out ellipsoid.
     """
     n = len(scaled.mid_cos)
-    field, unit = case.asteroid.gravity, 1.0 / scaled.acceleration_m_s2
-    on_ellipsoid = largest_acceleration_on_ellipsoid(field, case.ellipsoid_m) * unit
+    outside = bounds.outside_m_s2 / scaled.acceleration_m_s2
     t = np.arange(n + 1) / n
     drift = np.linalg.norm(scaled.position + t[:, None] * scaled.velocity, axis=1)
-    strongest = 1.0 / (1.0 - scaled.mass_flow) + on_ellipsoid
+    strongest = 1.0 / (1.0 - min(scaled.mass_flow, scaled.propellant)) + outside[0]
     distance = drift - 0.5 * strongest * t**2
     # within an interval the drift, which is straight, and the parabola stay this close to their chords
     bend = strongest + float(scaled.velocity @ scaled.velocity) / max(drift.min(), 1e-6)
-    nearest = np.minimum(distance[:-1], distance[1:]) - bend / (8 * n**2)
-    shells = np.linspace(np.min(case.ellipsoid_m) / scaled.length_m, max(nearest.max(), 0.0), TUBE_SHELLS)
-    if shells[-1] <= shells[0]:
-        return np.full(n, on_ellipsoid)
-    bounds = largest_acceleration_outside(field, shells * scaled.length_m, case.ellipsoid_m) * unit
-    inner = np.searchsorted(shells, nearest, side="right") - 1
-    return np.where(inner < 0, on_ellipsoid, bounds[np.maximum(inner, 0)])
-
-
-def arc_gravity(case: LandingCase, scaled: ScaledCase) -> float:
-    """Upper bound of gravity on and above the surface, where the final arcs fly, scaled."""
-    at_vertices = np.linalg.norm(accelerations(case.asteroid.gravity, case.asteroid.mesh.vertices), axis=1)
-    # |g| has its largest value on the surface; facets lie below their vertices' sphere by little
-    return float(1.02 * at_vertices.max() / scaled.acceleration_m_s2)
+    nearest = (np.minimum(distance[:-1], distance[1:]) - bend / (8 * n**2)) * scaled.length_m
+    shell = np.searchsorted(bounds.radius_m, nearest, side="right") - 1
+    return outside[np.maximum(shell, 0)]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -133,7 +143,7 @@ def certified_thrust_level(case, target, tube, arc_bound, model, multiplier, con
     tube : (N,) float
         Bounds of gravity from :func:`gravity_tube`.
     arc_bound : float
-        Bound from :func:`arc_gravity`.
+        Bound of gravity along the final arcs, scaled.
     model : Model
         Its matching rows' and cones' constant derivatives.
     multiplier : (R,) float

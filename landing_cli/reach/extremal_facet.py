@@ -1,4 +1,10 @@
-"""One facet by extremals: the trust-region SQP over the seven initial costates."""
+"""Facets by extremals: a trust-region SQP over the seven initial costates.
+
+Beyond the free end of the horizon nothing is relaxed: every trial is an exact extremal, flown to the
+handover; the SQP moves its costates until the two-stage landing meets every row of ``extremal_terms`` at
+the least energy. The Hessian is exact where it can be had for nothing (see ``_differentiate``), and secant
+updates supply the rest.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +34,6 @@ from landing_cli.reach.costate_dynamics import (
     tangents,
 )
 from landing_cli.reach.extremal_terms import (
-    MAX_DIPS,
     MAX_ROWS,
     ROW_DIPS,
     ROW_HANDOVER,
@@ -44,121 +49,169 @@ from landing_cli.reach.extremal_terms import (
 )
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 N_STEPS = 30
 N = 7
 UNCONVERGED, OPTIMAL, STUCK = 0, 1, 2
-FEASIBLE = 1e-7
-MAX_ROUNDS = 120
-FIRST_PRICE, LAST_PRICE = 10.0, 1e3
+
+FEASIBLE = 1e-7  # sum of violations
 SETTLED = 1e-9  # of the merit: nothing more is expected
 HOPELESS = 1e-4  # of the violation: a full step expects no less of it
-FULL_REACH, SMALLEST_REACH = 1e-2, 1e-10
+MAX_ROUNDS = 120
+FIRST_PRICE, LAST_PRICE = 10.0, 1e3
+FIRST_REACH, FULL_REACH, LONGEST_REACH, SHORTEST_REACH = 0.5, 1e-2, 4.0, 1e-10
 MOST_PROBES = 3
 
 
+class Trial(NamedTuple):
+    """What a flown extremal costs and breaks."""
+
+    steps: int
+    rows: int
+    energy: float  # J over a0^2 t_p
+    broken: float  # violation
+
+
 class Flight(NamedTuple):
-    """A trial: the extremal, its dips and the rows' values."""
+    """A flown extremal, its dips and the rows' values."""
 
     extremal: Extremal
     dips: Dips
     values: Floats  # (MAX_ROWS,)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def new_flight() -> Flight:
-    """Room for one trial."""
-    return Flight(new_extremal(N_STEPS), new_dips(), np.zeros(MAX_ROWS))
+class Search(NamedTuple):
+    """Everything that a facet's search works in; allocated once and used for many facets."""
+
+    model: LocalModel
+    qp: ElasticQP
+    multipliers: Floats  # (MAX_ROWS,)
+    secant: Floats  # (7, 7) what the exact part of the Hessian leaves out
+    old_gradient: Floats  # (7,)
+    old_jacobian: Floats  # (MAX_ROWS, 7)
+    node_tangents: Floats  # (nodes, 6, 8)
+    step: Floats  # (7,)
+    second: Floats  # (7,) corrected step
+    trial: Floats  # (7,)
+    radius: Floats  # (7,)
+    spare_rows: Floats  # (2, MAX_ROWS)
+    end_jacobian: Floats  # (ROW_MASS, 7)
+    end_gradient: Floats  # (7,)
+
+
+class Ended(NamedTuple):
+    """How a search ended: ``OPTIMAL``, ``STUCK`` (a local least of the violation) or ``UNCONVERGED``."""
+
+    status: int
+    rounds: int
+    energy: float  # J over a0^2 t_p
+    broken: float
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fly_trial(
-    problem: ExtremalProblem,
-    target: Floats,
-    normal: Floats,
-    costates: Floats,
-    flight: Flight,
-    jacobian: Floats,
-    gradient: Floats,
-) -> tuple[int, int, float]:
-    """Fly the extremal of the given costates and evaluate cost and rows.
+def new_flight(n_steps: int) -> Flight:
+    """Room for one extremal."""
+    return Flight(new_extremal(n_steps), new_dips(), np.zeros(MAX_ROWS))
 
-    Returns
-    -------
-    steps, rows : int
-    energy : float
-        J over ``a0^2 t_p``.
-    """
-    y = flight.extremal.state[0]
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def new_search(problem: ExtremalProblem) -> Search:
+    """Work space for the facets of one case."""
+    model = new_local_model(N, MAX_ROWS)
+    for r in range(MAX_ROWS):
+        model.equality[r] = r == ROW_MASS or (r == ROW_HANDOVER and problem.on_ellipsoid)
+        model.pooled[r] = r >= ROW_DIPS or (r == ROW_HANDOVER and not problem.on_ellipsoid)
+    return Search(
+        model,
+        new_qp_for(N, MAX_ROWS),
+        np.zeros(MAX_ROWS),
+        np.zeros((N, N)),
+        np.zeros(N),
+        np.zeros((MAX_ROWS, N)),
+        np.zeros((N_STEPS + MAX_SPLITS + 1, 6, COLUMNS)),
+        np.zeros(N),
+        np.zeros(N),
+        np.zeros(N),
+        np.zeros(N),
+        np.zeros((2, MAX_ROWS)),
+        np.zeros((ROW_MASS, N)),
+        np.zeros(N),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def start_extremal(problem: ExtremalProblem, costates: Floats, extremal: Extremal) -> None:
+    """Set the initial state and costates."""
+    y = extremal.state[0]
     for i in range(3):
         y[i], y[3 + i] = problem.position[i], problem.velocity[i]
     y[6], y[14] = 1.0, 0.0
     for i in range(N):
         y[7 + i] = costates[i]
-    k = fly_extremal(problem.field, N_STEPS, flight.extremal)
-    x = flight.extremal.state[k]
-    handover_rows(problem, target, normal, x, flight.values, jacobian)
-    flight.values[ROW_MASS] = x[13]
-    n_dips = find_dips(problem.field.inverse_axes, flight.extremal, k, flight.dips)
-    for d in range(n_dips):
-        flight.values[ROW_DIPS + d] = flight.dips.level[d] - 1.0
-    return k, ROW_DIPS + n_dips, x[14] + final_energy(problem, target, x, gradient)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def differentiate(
-    problem: ExtremalProblem,
-    target: Floats,
-    normal: Floats,
-    flight: Flight,
-    k: int,
-    rows: int,
-    multipliers: Floats,
-    node_tangents: Floats,
-    model: LocalModel,
+def _try(
+    problem: ExtremalProblem, target: Floats, normal: Floats, costates: Floats, flight: Flight, search: Search
+) -> Trial:
+    """Fly the extremal of the given costates and evaluate cost and rows."""
+    start_extremal(problem, costates, flight.extremal)
+    k = fly_extremal(problem.field, N_STEPS, flight.extremal)
+    x = flight.extremal.state[k]
+    handover_rows(problem, target, normal, x, flight.values, search.end_jacobian)
+    flight.values[ROW_MASS] = x[13]
+    rows = ROW_DIPS + find_dips(problem.field.inverse_axes, flight.extremal, k, flight.dips)
+    for d in range(rows - ROW_DIPS):
+        flight.values[ROW_DIPS + d] = flight.dips.level[d] - 1.0
+    energy = x[14] + final_energy(problem, target, x, search.end_gradient)
+    broken = violation(flight.values, search.model.equality, search.model.pooled, rows)
+    return Trial(k, rows, energy, broken)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _differentiate(
+    problem: ExtremalProblem, target: Floats, normal: Floats, flight: Flight, trial: Trial, search: Search
 ) -> None:
     """Fill the local model at a flown trial.
 
-    The Hessian rests on the costates being the gradient of the descent's least energy: with S and P the
-    derivatives of the last state and the last costates, that energy has the Hessian -S'P where the costates
-    are those of the optimum.
+    The costates at the handover are the gradient of the descent's least energy as a function of the handover
+    state x. With S = dx/dlambda and P the derivative of the last costates, the energy's Hessian in the
+    initial costates is therefore -S'P, up to terms that vanish at an optimum without dips, and S'KS adds
+    what the final stage and its rows bend.
     """
-    X, K = np.zeros((STATE, COLUMNS)), np.zeros((7, 7))
-    at_handover, of_final = np.zeros((ROW_MASS, 7)), np.zeros(7)
-    tangents(problem.field, flight.extremal, k, X, node_tangents)
-    x = flight.extremal.state[k]
-    handover_rows(problem, target, normal, x, model.values, at_handover)
-    final_energy(problem, target, x, of_final)
+    model, multipliers = search.model, search.multipliers
+    X, K = np.zeros((STATE, COLUMNS)), np.zeros((N, N))
+    tangents(problem.field, flight.extremal, trial.steps, X, search.node_tangents)
+    x = flight.extremal.state[trial.steps]
+    handover_rows(problem, target, normal, x, model.values, search.end_jacobian)
+    final_energy(problem, target, x, search.end_gradient)
     handover_hessian(problem, target, x, multipliers, K)
     for j in range(N):
-        model.gradient[j] = X[14, j]
-        for i in range(7):
-            model.gradient[j] += of_final[i] * X[i, j]
+        model.gradient[j], model.jacobian[ROW_MASS, j] = X[14, j], X[13, j]
         for r in range(ROW_MASS):
-            total = 0.0
-            for i in range(7):
-                total += at_handover[r, i] * X[i, j]
-            model.jacobian[r, j] = total
-        model.jacobian[ROW_MASS, j] = X[13, j]
+            model.jacobian[r, j] = 0.0
+        for i in range(N):
+            model.gradient[j] += search.end_gradient[i] * X[i, j]
+            for r in range(ROW_MASS):
+                model.jacobian[r, j] += search.end_jacobian[r, i] * X[i, j]
     for a in range(N):
         for b in range(a + 1):
             total = 0.0
-            for i in range(7):
+            for i in range(N):
                 total -= 0.5 * (X[i, a] * X[7 + i, b] + X[i, b] * X[7 + i, a])
-                for j in range(7):
+                for j in range(N):
                     total += X[i, a] * K[i, j] * X[j, b]
             model.hessian[a, b] = model.hessian[b, a] = total
-    for r in range(rows):
+    for r in range(trial.rows):
         model.values[r] = flight.values[r]
-    for d in range(rows - ROW_DIPS):
-        r = ROW_DIPS + d
+    for r in range(ROW_DIPS, trial.rows):
         dip_row(
             problem,
             flight.extremal,
-            node_tangents,
-            flight.dips.step[d],
-            flight.dips.fraction[d],
-            flight.dips.bend[d],
+            search.node_tangents,
+            flight.dips,
+            r - ROW_DIPS,
             model.jacobian[r],
             -multipliers[r],
             model.hessian,
@@ -166,124 +219,175 @@ def differentiate(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def solve_from(
-    problem: ExtremalProblem, target: Floats, normal: Floats, costates: Floats, log: Floats
-) -> tuple[int, int, float, float]:
-    """Improve the costates in place.
+def _renew_model(
+    problem: ExtremalProblem,
+    target: Floats,
+    normal: Floats,
+    flight: Flight,
+    trial: Trial,
+    old_rows: int,
+    search: Search,
+) -> None:
+    """Differentiate at a new point and learn from the step that led there (``old_rows`` 0: none did)."""
+    model, secant = search.model, search.secant
+    for a in range(N):
+        search.old_gradient[a] = model.gradient[a]
+        for r in range(MAX_ROWS):
+            search.old_jacobian[r, a] = model.jacobian[r, a]
+    _differentiate(problem, target, normal, flight, trial, search)
+    if old_rows == trial.rows:
+        change = np.zeros(N)
+        for a in range(N):
+            change[a] = model.gradient[a] - search.old_gradient[a]
+            for r in range(trial.rows):
+                change[a] -= search.multipliers[r] * (model.jacobian[r, a] - search.old_jacobian[r, a])
+            for b in range(N):
+                change[a] -= model.hessian[a, b] * search.step[b]
+        add_secant(change, search.step, secant)
+    else:
+        for a in range(N):
+            for b in range(N):
+                secant[a, b] = 0.0
+    for a in range(N):
+        for b in range(N):
+            model.hessian[a, b] += secant[a, b]
+    convexify(model.hessian)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _correct(flight: Flight, rows: int, price: float, search: Search) -> None:
+    """Second-order correction: aim again, from what the rows turned out to be after the step."""
+    model, kept, unused = search.model, search.spare_rows[0], search.spare_rows[1]
+    for r in range(rows):
+        kept[r], model.values[r] = model.values[r], flight.values[r]
+        for a in range(N):
+            model.values[r] -= model.jacobian[r, a] * search.step[a]
+    propose(model, rows, price, search.radius, search.qp, search.second, unused)
+    for r in range(rows):
+        model.values[r] = kept[r]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _take_step(
+    problem: ExtremalProblem,
+    target: Floats,
+    normal: Floats,
+    costates: Floats,
+    now: Trial,
+    price: float,
+    expected: float,
+    there: Flight,
+    spare: Flight,
+    search: Search,
+) -> tuple[Trial, float, bool]:
+    """Fly the proposed step, or its correction where that is better.
 
     Returns
     -------
-    status : int
-        ``OPTIMAL``, ``STUCK`` (a local minimum of the violation) or ``UNCONVERGED``.
-    rounds : int
-    energy : float
-        J over ``a0^2 t_p``.
-    violation : float
+    trial : Trial
+    ratio : float
+        How much the merit fell, over what was expected.
+    corrected : bool
+        Whether the trial is the corrected one, flown in ``spare``.
     """
-    here, there, other = new_flight(), new_flight(), new_flight()
-    kept, step2, trial2, multipliers2 = np.zeros(MAX_ROWS), np.zeros(N), np.zeros(N), np.zeros(MAX_ROWS)
-    model, qp = new_local_model(N, MAX_ROWS), new_qp_for(N, MAX_ROWS)
+    for a in range(N):
+        search.trial[a] = costates[a] + search.step[a]
+    then = _try(problem, target, normal, search.trial, there, search)
+    ratio = (now.energy - then.energy + price * (now.broken - then.broken)) / expected
+    if ratio >= 0.5 or then.rows != now.rows:
+        return then, ratio, False
+    _correct(there, now.rows, price, search)
+    for a in range(N):
+        search.trial[a] = costates[a] + search.second[a]
+    other = _try(problem, target, normal, search.trial, spare, search)
+    better = (now.energy - other.energy + price * (now.broken - other.broken)) / expected
+    if better <= ratio:
+        return then, ratio, False
+    for a in range(N):
+        search.step[a] = search.second[a]
+    return other, better, True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def search_extremal(
+    problem: ExtremalProblem,
+    target: Floats,
+    normal: Floats,
+    costates: Floats,
+    here: Flight,
+    there: Flight,
+    spare: Flight,
+    search: Search,
+) -> tuple[Ended, Flight]:
+    """Improve the initial costates for one facet.
+
+    Parameters
+    ----------
+    problem : ExtremalProblem
+        The case.
+    target : (3,) float, scaled, body frame
+        Touchdown point.
+    normal : (3,) float, body frame
+        Outward unit normal of the facet.
+    costates : (7,) float, scaled
+        The start; holds the best costates on return.
+    here, there, spare : Flight
+        Scratch space.
+    search : Search
+        Scratch space; its multipliers belong to the returned costates.
+
+    Returns
+    -------
+    ended : Ended
+    flight : Flight
+        The one of the three that holds the extremal of the returned costates.
+    """
+    price, reach, probes = FIRST_PRICE, FIRST_REACH, 0
+    fresh, old_rows, status, rounds = True, 0, UNCONVERGED, 0
     for r in range(MAX_ROWS):
-        model.equality[r] = r == ROW_MASS or (r == ROW_HANDOVER and problem.on_ellipsoid)
-        model.pooled[r] = r >= ROW_DIPS or (r == ROW_HANDOVER and not problem.on_ellipsoid)
-    node_tangents = np.zeros((N_STEPS + MAX_SPLITS + 1, 6, COLUMNS))
-    unused_j, unused_g = np.zeros((ROW_MASS, 7)), np.zeros(7)
-    multipliers, step, trial, radius = np.zeros(MAX_ROWS), np.zeros(N), np.zeros(N), np.zeros(N)
-    old_gradient, old_jacobian, old_rows = np.zeros(N), np.zeros((MAX_ROWS, N)), 0
-    secant, change, moved = np.zeros((N, N)), np.zeros(N), np.zeros(N)
-    price, reach = FIRST_PRICE, 0.5
-    status = UNCONVERGED
-    k, rows, energy = fly_trial(problem, target, normal, costates, here, unused_j, unused_g)
-    fresh, stepped = True, False
-    rounds, probes = 0, 0
-    broken = 0.0
+        search.multipliers[r] = 0.0
+    now = _try(problem, target, normal, costates, here, search)
     for rounds in range(1, MAX_ROUNDS + 1):
         if fresh:
-            old_gradient[:] = model.gradient
-            old_jacobian[:, :] = model.jacobian
-            differentiate(problem, target, normal, here, k, rows, multipliers, node_tangents, model)
-            broken = violation(model.values, model.equality, model.pooled, rows)
-            if stepped and rows == old_rows:
-                for a in range(N):
-                    change[a] = model.gradient[a] - old_gradient[a]
-                    for r in range(rows):
-                        change[a] -= multipliers[r] * (model.jacobian[r, a] - old_jacobian[r, a])
-                    for b in range(N):
-                        change[a] -= model.hessian[a, b] * moved[b]
-                add_secant(change, moved, secant)
-            elif stepped:
-                secant[:, :] = 0.0
-            for a in range(N):
-                for b in range(N):
-                    model.hessian[a, b] += secant[a, b]
-            convexify(model.hessian)
-            old_rows = rows
+            _renew_model(problem, target, normal, here, now, old_rows, search)
             fresh = False
         size = 1.0
         for a in range(6):
             size = max(size, abs(costates[a]))
         for a in range(N):
-            radius[a] = reach * size
-        expected = propose(model, rows, price, radius, qp, step, multipliers)
-        log[rounds, 0], log[rounds, 1], log[rounds, 2], log[rounds, 3], log[rounds, 4] = (
-            energy,
-            broken,
-            expected,
-            reach,
-            price,
+            search.radius[a] = reach * size
+        expected = propose(
+            search.model, now.rows, price, search.radius, search.qp, search.step, search.multipliers
         )
-        if reach < SMALLEST_REACH and probes == MOST_PROBES:
+        if now.broken < FEASIBLE and expected < SETTLED * (1.0 + abs(now.energy)):
+            status = OPTIMAL
             break
-        if broken < FEASIBLE:
-            if expected < SETTLED * (1.0 + abs(energy)):
-                status = OPTIMAL
-                break
-        elif expected < max(SETTLED, HOPELESS * price * broken):
+        if now.broken >= FEASIBLE and expected < max(SETTLED, HOPELESS * price * now.broken):
             if reach < FULL_REACH and probes < MOST_PROBES:
                 reach, probes = 2.0 * FULL_REACH, probes + 1
-                continue
-            if price >= LAST_PRICE:
+            elif price < LAST_PRICE:
+                price *= 10.0
+            else:
                 status = STUCK
                 break
-            price *= 10.0
             continue
-        for a in range(N):
-            trial[a] = costates[a] + step[a]
-        k2, rows2, energy2 = fly_trial(problem, target, normal, trial, there, unused_j, unused_g)
-        broken2 = violation(there.values, model.equality, model.pooled, rows2)
-        ratio = (energy - energy2 + price * (broken - broken2)) / expected
-        if ratio < 0.5 and rows2 == rows:
-            # second-order correction: aim again from what the rows turned out to be
-            for r in range(rows):
-                kept[r] = model.values[r]
-                model.values[r] = there.values[r]
-                for a in range(N):
-                    model.values[r] -= model.jacobian[r, a] * step[a]
-            propose(model, rows, price, radius, qp, step2, multipliers2)
-            for r in range(rows):
-                model.values[r] = kept[r]
-            for a in range(N):
-                trial2[a] = costates[a] + step2[a]
-            k3, rows3, energy3 = fly_trial(problem, target, normal, trial2, other, unused_j, unused_g)
-            broken3 = violation(other.values, model.equality, model.pooled, rows3)
-            ratio2 = (energy - energy3 + price * (broken - broken3)) / expected
-            if ratio2 > ratio:
-                ratio, k2, rows2, energy2, broken2 = ratio2, k3, rows3, energy3, broken3
-                there, other = other, there
-                trial[:] = trial2
-                step[:] = step2
-        log[rounds, 5] = ratio
+        then, ratio, corrected = _take_step(
+            problem, target, normal, costates, now, price, expected, there, spare, search
+        )
+        if corrected:
+            there, spare = spare, there
         longest = 0.0
         for a in range(N):
-            longest = max(longest, abs(step[a]))
+            longest = max(longest, abs(search.step[a]))
         if ratio > 1e-3:
-            for a in range(N):
-                costates[a], moved[a] = trial[a], step[a]
+            old_rows, now, fresh = now.rows, then, True
             here, there = there, here
-            k, rows, energy = k2, rows2, energy2
-            fresh, stepped = True, True
-        if ratio < 0.25:
+            for a in range(N):
+                costates[a] += search.step[a]
+        if ratio > 0.75:
+            reach = max(reach, min(3.0 * longest / size, LONGEST_REACH))
+        elif not ratio >= 0.25:
             reach = 0.25 * longest / size
-        elif ratio > 0.75:
-            reach = max(reach, min(3.0 * longest / size, 4.0))
-    return status, rounds, energy, broken
+            if reach < SHORTEST_REACH:
+                break
+    return Ended(status, rounds, now.energy, now.broken), here

@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 
 # Fractions of the final stage's time-to-go at which its thrust bound is imposed. a* is linear in time, so
 # two ends would do for it alone; gravity along the arc bends the real thrust between them.
-ARC_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
+ARC_FRACTIONS = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
 N_ARC = len(ARC_FRACTIONS)
 ROW_GLIDE = N_ARC
 ROW_HANDOVER = N_ARC + 2
@@ -385,9 +385,8 @@ def dip_row(
     problem: ExtremalProblem,
     extremal: Extremal,
     node_tangents: Floats,
-    k: int,
-    f: float,
-    bend: float,
+    dips: Dips,
+    place: int,
     row: Floats,
     weight: float,
     hessian: Floats,
@@ -397,6 +396,7 @@ def dip_row(
     At a dip the time of it does not matter to first order. To second order it does: the Hessian without the
     path's own second derivative, times ``weight``, is added to ``hessian`` (7, 7).
     """
+    k, f, bend = dips.step[place], dips.fraction[place], dips.bend[place]
     before, after = extremal.state[k], extremal.state[k + 1]
     a, b, c, d, ta, tb, tc, td = hermite(f)
     h = extremal.step[k]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from landing_cli.body.adjacency import mean_edge_m
 from landing_cli.body.bvh import SurfaceIndex, build_surface_index
 from landing_cli.body.mesh import facet_centroids, facet_normals
-from landing_cli.reach.certificate import arc_gravity, gravity_tube
+from landing_cli.reach.certificate import GravityBounds, gravity_bounds, gravity_tube
 from landing_cli.reach.delivery import VALUE_COLUMNS, Frame, deliver_many, new_deliveries
 from landing_cli.reach.free_batch import Batch
 from landing_cli.reach.free_flights import Question, best_flights
@@ -48,22 +48,42 @@ PATH_COLUMNS = (
 
 
 @dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What all cases over one asteroid and ellipsoid share."""
+
+    surface: SurfaceIndex
+    centroids_m: Floats
+    normals: Floats
+    mean_edge_m: float
+    bounds: GravityBounds
+
+
+@dataclass(frozen=True, eq=False)
 class PreparedCase:
     """A landing case with everything that its facets share, ready for the kernel; it pickles."""
 
     case: LandingCase
+    shared: Surroundings
     coarse: ScaledCase
     fine: ScaledCase
     coarse_tube: Floats
     fine_tube: Floats
-    arc_bound: float
     frame: Frame
-    surface: SurfaceIndex
-    centroids_m: Floats
-    normals: Floats
 
 
-def prepare(case: LandingCase) -> PreparedCase:
+def survey(case: LandingCase) -> Surroundings:
+    """Compute what all cases over the asteroid and ellipsoid of this one share."""
+    mesh = case.asteroid.mesh
+    return Surroundings(
+        build_surface_index(mesh),
+        facet_centroids(mesh),
+        facet_normals(mesh),
+        mean_edge_m(mesh),
+        gravity_bounds(case.asteroid, case.ellipsoid_m),
+    )
+
+
+def prepare(case: LandingCase, shared: Surroundings) -> PreparedCase:
     """Scale a case and compute what its facets share."""
     craft = case.spacecraft
     coarse, fine = scale_case(case, INTERVALS), scale_case(case, FINE_INTERVALS)
@@ -76,20 +96,10 @@ def prepare(case: LandingCase) -> PreparedCase:
         rotation_rate_rad_s=case.asteroid.rotation_rate_rad_s,
         propellant_kg=math.inf if craft.propellant_kg is None else craft.propellant_kg,
         half_angle_rad=case.glide_slope_half_angle_rad,
-        clear_radius_m=mean_edge_m(case.asteroid.mesh),
+        clear_radius_m=shared.mean_edge_m,
     )
-    return PreparedCase(
-        case,
-        coarse,
-        fine,
-        gravity_tube(case, coarse),
-        gravity_tube(case, fine),
-        arc_gravity(case, coarse),
-        frame,
-        build_surface_index(case.asteroid.mesh),
-        facet_centroids(case.asteroid.mesh),
-        facet_normals(case.asteroid.mesh),
-    )
+    tubes = gravity_tube(coarse, shared.bounds), gravity_tube(fine, shared.bounds)
+    return PreparedCase(case, shared, coarse, fine, *tubes, frame)
 
 
 class Work(NamedTuple):
@@ -101,8 +111,10 @@ class Work(NamedTuple):
 
 
 def _new_work(prepared: PreparedCase, scaled: ScaledCase, tube: Floats, facets: Ints) -> Work:
-    targets, normals = prepared.centroids_m[facets] / scaled.length_m, prepared.normals[facets]
-    question = Question(scaled, targets, normals, False, tube, prepared.arc_bound)
+    shared = prepared.shared
+    targets, normals = shared.centroids_m[facets] / scaled.length_m, shared.normals[facets]
+    arc_bound = shared.bounds.on_arcs_m_s2 / scaled.acceleration_m_s2
+    question = Question(scaled, targets, normals, False, tube, arc_bound)
     return Work(question, blank_rows(facets), np.zeros((len(facets), len(scaled.mid_cos), 3)))
 
 
@@ -176,10 +188,10 @@ def _deliver(prepared: PreparedCase, work: Work, chosen: Ints, flights: Batch) -
     deliver_many(
         scaled,
         prepared.frame,
-        prepared.surface,
+        prepared.shared.surface,
         flights.thrust[found],
-        prepared.centroids_m[facets],
-        prepared.normals[facets],
+        prepared.shared.centroids_m[facets],
+        prepared.shared.normals[facets],
         out,
     )
     work.thrust[places] = flights.thrust[found]
@@ -263,5 +275,5 @@ def replace_rows(solutions: FacetSolutions, places: Ints, better: FacetSolutions
 
 
 def solve_facets(case: LandingCase, facets: NDArray[np.integer]) -> FacetSolutions:
-    """Solve some facets of a case (prepares the case each time; see :func:`prepare`)."""
-    return solve_prepared(prepare(case), facets)
+    """Solve some facets of a case (it surveys and prepares the case each time)."""
+    return solve_prepared(prepare(case, survey(case)), facets)

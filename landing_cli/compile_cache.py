@@ -1,0 +1,36 @@
+"""A cache of compiled kernels that never serves a stale one.
+
+numba looks only at the file a kernel is written in; an edit in a module that it imports would go unseen
+and old machine code would answer. So the cache folder is named after everything that kernels are made of.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+ROOMS = ("body", "flight", "optimize", "reach")
+
+
+def fingerprint(package: Path) -> str:
+    """Hash names, sizes and times of all files that hold kernels."""
+    digest = hashlib.sha256()
+    for room in ROOMS:
+        for file in sorted((package / room).rglob("*.py")):
+            status = file.stat()
+            digest.update(f"{file.relative_to(package)} {status.st_size} {status.st_mtime_ns}\n".encode())
+    return digest.hexdigest()[:16]
+
+
+def use_own_cache() -> None:
+    """Point numba to this version's folder, unless NUMBA_CACHE_DIR is set or no folder can be made."""
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = base / "landing" / "kernels" / fingerprint(Path(__file__).parent)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)

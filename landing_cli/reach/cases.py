@@ -1,0 +1,37 @@
+"""The landing cases of a scenario."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from landing_cli.reach.records import LandingCase
+from landing_cli.scenario.build import Built
+from landing_cli.scenario.schema import Scenario
+
+
+def landing_cases(scenario: Scenario, built: Built) -> tuple[tuple[str, LandingCase], ...]:
+    """Make every case of a scenario, in its order, each with the name of its initial state."""
+    reach = scenario.reach
+    return tuple(
+        (
+            state.name,
+            LandingCase(
+                name=name,
+                asteroid=built.asteroid,
+                spacecraft=built.spacecraft,
+                position_m=np.array(state.start_m, dtype=np.float64),
+                velocity_m_s=np.array(state.velocity_m_s, dtype=np.float64),
+                tof_s=tof_s,
+                final_stage_s=reach.final_stage_s,
+                ellipsoid_m=np.asarray(built.ellipsoid_m, dtype=np.float64),
+                glide_slope_half_angle_rad=math.radians(reach.glide_slope_half_angle_deg),
+                handover=reach.handover,
+                final_stage_thrust=reach.final_stage_thrust,
+                descent=reach.descent,
+                terrain=reach.terrain,
+            ),
+        )
+        for name, state, tof_s in reach.cases()
+    )
