@@ -16,6 +16,7 @@ import pytest
 from landing_cli.errors import InputRefused, OutputRefused
 from landing_cli.reach.records import FACET_DTYPE, FacetSolutions, blank_rows
 from landing_cli.reach.stored import solutions_from_arrays, solutions_to_arrays
+from landing_cli.results.disk import lock_file
 from landing_cli.results.identity import RunIdentity
 from landing_cli.results.journal import Journal, read_journal
 from landing_cli.results.output import OutputState, inspect_output, journal_path, open_output
@@ -160,6 +161,39 @@ def test_a_record_of_nonsense_under_a_sound_checksum_ends_the_reading(recorded: 
 def test_a_run_that_recorded_nothing_leaves_nothing(tmp_path: Path) -> None:
     opened(tmp_path / "run.h5").close()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_every_record_is_on_the_disk_before_the_next_is_awaited(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[int] = []
+    real = os.fdatasync
+    monkeypatch.setattr(os, "fdatasync", lambda fd: (synced.append(os.fstat(fd).st_size), real(fd))[1])
+    with opened(tmp_path / "run.h5") as journal:
+        for index in range(3):
+            journal.append(f"case/{index}", chunk(index))
+            assert synced[-1] == journal_path(tmp_path / "run.h5").stat().st_size
+    assert len(synced) == 4
+
+
+def test_a_lock_on_a_file_that_its_owner_just_deleted_is_no_lock(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import fcntl
+
+    path, real, calls = tmp_path / "x", fcntl.flock, []
+
+    def flock(descriptor: int, how: int) -> None:
+        if not calls:
+            path.unlink()  # the first owner finishes between our open and our lock
+        calls.append(descriptor)
+        real(descriptor, how)
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    descriptor = lock_file(path)
+    assert len(calls) == 2
+    assert os.fstat(descriptor).st_ino == path.stat().st_ino
+    os.close(descriptor)
 
 
 def test_arrays_of_objects_are_not_recorded(tmp_path: Path) -> None:

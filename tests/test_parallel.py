@@ -71,6 +71,7 @@ def test_loky_workers_ignore_ctrl_c_and_run_blas_on_one_thread():
     for facts in answers.values():
         assert facts["pid"] != os.getpid()
         assert facts["sigint"] is True
+        assert facts["masked"] is True  # from the first instruction on
         assert facts["blas"] == "1"
 
 
@@ -99,8 +100,9 @@ for index, answer in run_chunks(work, [[i] for i in range(500)], WorkPlan(2, "lo
 """
 
 
-def test_workers_die_with_a_parent_that_is_killed():
-    parent = subprocess.Popen([sys.executable, "-c", PARENT], stdout=subprocess.PIPE, env=_environment())
+def test_workers_die_with_a_parent_that_is_killed_even_in_the_middle_of_a_chunk():
+    script = PARENT.replace("partial(toy_work.squares, pause_s=0.2)", "toy_work.gets_stuck")
+    parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, env=_environment())
     assert parent.stdout is not None
     parent.stdout.readline()
     workers = _children(parent.pid)

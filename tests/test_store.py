@@ -87,6 +87,8 @@ def test_a_run_comes_back_equal_in_every_number(stored: Path) -> None:
         np.testing.assert_array_equal(a.case.ellipsoid_m, b.case.ellipsoid_m)
         assert (a.case.tof_s, a.case.handover) == (b.case.tof_s, b.case.handover)
     np.testing.assert_array_equal(before.asteroid.gravity.params, after.asteroid.gravity.params)
+    offsets = read(stored).tree.group("cases", "pole_700s", "trajectories").dataset("node_offsets").data
+    np.testing.assert_array_equal(offsets, before.cases[1].solutions.node_offsets)
     assert after.asteroid.gravity.kind is GravityKind.DIPOLE
     assert after.lost_facets == 1
 
@@ -99,6 +101,20 @@ def test_the_same_run_makes_the_same_bytes_and_provenance_stays_out_of_the_diges
     assert stored.read_bytes() != first
     assert read(stored).provenance["cpu_s"] == 2.0
     assert write(stored, run_to_tree(make_run(seed=1)), ROOT, PROVENANCE) != fingerprint
+
+
+def test_the_bytes_reach_the_disk_before_the_name_does(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[str] = []
+    for place, name in ((os, "write"), (os, "fsync"), (Path, "replace")):
+        real = getattr(place, name)
+        monkeypatch.setattr(place, name, lambda *a, real=real, name=name: (calls.append(name), real(*a))[1])
+    write(stored, run_to_tree(make_run()), ROOT, PROVENANCE)
+    assert [c for i, c in enumerate(calls) if i == 0 or calls[i - 1] != c] == [
+        "write",
+        "fsync",
+        "replace",
+        "fsync",
+    ]
 
 
 def test_every_array_has_a_checksum_a_unit_a_description_and_named_dimensions(stored: Path) -> None:

@@ -19,6 +19,11 @@ def squares(chunk: Sequence[int], pause_s: float = 0.0) -> NDArray[np.int64]:
     return np.array(chunk, dtype=np.int64) ** 2
 
 
+def gets_stuck(chunk: Sequence[int]) -> NDArray[np.int64]:
+    """Answer the first chunk, and take half a minute for any other."""
+    return squares(chunk, 30.0 if chunk[0] else 0.0)
+
+
 def big_answer(chunk: Sequence[int]) -> NDArray[np.float64]:
     """More than a pipe holds."""
     return np.full((len(chunk), 200_000), float(chunk[0]))
@@ -45,5 +50,6 @@ def who_am_i(chunk: Sequence[int]) -> dict[str, object]:
     return {
         "pid": os.getpid(),
         "sigint": signal.getsignal(signal.SIGINT) == signal.SIG_IGN,
+        "masked": signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []),
         "blas": os.environ.get("OPENBLAS_NUM_THREADS"),
     }
