@@ -13,6 +13,8 @@ import casadi as ca
 import numpy as np
 from problem import Problem, descent_function, final_stage_function, symbols
 
+CONVERGED = 2e-4  # relative change of tau or J by doubling the intervals
+DOUBLINGS = 3
 RHO = 1e-5  # weight of J beside tau: picks one of many controls, and moves tau by less than RHO
 IPOPT = {
     "print_time": False,
@@ -180,15 +182,11 @@ def refine(path: Local, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class Answer:
-    """The best over the starts, on n and on 2n intervals."""
+    """The best over the starts: on the last number of intervals and on half as many."""
 
-    coarse: Local | None
-    fine: Local | None
+    half: Local | None
+    best: Local | None
     statuses: str  # one letter a start: value reached (=best b, worse w), or failed f
-
-    @property
-    def best(self) -> Local | None:
-        return self.fine if self.fine is not None else self.coarse
 
 
 def _value(path: Local, mode: str) -> float:
@@ -203,7 +201,7 @@ def best_over_starts(
     extra: dict[str, tuple[np.ndarray, np.ndarray]] | None = None,
     names: tuple[str, ...] | None = None,
 ) -> Answer:
-    """Solve from every start on n intervals, and the best again on 2n."""
+    """Solve from every start on n intervals, and the best again on 2n, 4n, 8n until it has converged."""
     guesses = starts(problem, n, rng) | (extra or {})
     if names is not None:
         guesses = {k: v for k, v in guesses.items() if k in names or k in (extra or {})}
@@ -214,6 +212,12 @@ def best_over_starts(
     coarse = min(good, key=lambda p: _value(p, mode))
     limit = _value(coarse, mode) * (1 + 1e-4)
     letters = ["f" if not p.solved else "b" if _value(p, mode) <= limit else "w" for p in paths.values()]
-    x, u = refine(coarse, 2 * n)
-    fine = solve(problem, 2 * n, mode, x, u, coarse.tau)
-    return Answer(coarse, fine if fine.solved else None, "".join(letters))
+    levels = [coarse]
+    for k in range(1, DOUBLINGS + 1):
+        finer = solve(problem, n * 2**k, mode, *refine(levels[-1], n * 2**k), levels[-1].tau)
+        if not finer.solved:
+            break
+        levels.append(finer)
+        if abs(_value(levels[-2], mode) / _value(finer, mode) - 1) < CONVERGED:
+            break
+    return Answer(levels[-2] if len(levels) > 1 else coarse, levels[-1], "".join(letters))

@@ -139,7 +139,7 @@ def descent_function(kind: str) -> Any:
     return ca.Function("f", [x, u, p], [ca.vertcat(x[3:6], acceleration, -flow)])
 
 
-def final_stage_function(kind: str, samples: int = 17) -> Any:
+def final_stage_function(kind: str, samples: int = 33) -> Any:
     """Final stage from the handover state: thrust ratios along the arc, cone margins, J2.
 
     With time-to-go s, r - r_c = s^2 (A + B s): total acceleration 2A + 6Bs, velocity -(2A + 3Bs) s.
