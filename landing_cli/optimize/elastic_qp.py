@@ -23,7 +23,8 @@ from landing_cli.optimize.small_dense import cholesky, cholesky_solve
 Floats = NDArray[np.float64]
 
 MAX_ITERATIONS = 40
-TOLERANCE = 1e-11  # of the mean complementarity
+SHORTEST = 1e-6
+TOLERANCE = 1e-11  # of the mean complementarity, relative to what the rows can cost
 FRACTION_TO_BOUNDARY = 0.995
 
 
@@ -38,19 +39,10 @@ class ElasticQP(NamedTuple):
     radius: Floats  # (n,) positive
 
 
-class _Work(NamedTuple):
-    """The iterate and its steps: rows first, then the two sides of the box, (m + 2 n,) each."""
-
-    slack: Floats
-    give: Floats  # t; zero for rows that do not give way, the box among them
-    dual: Floats
-    weight: Floats  # D = 1 / (slack / dual + give / (price - dual))
-    shift: Floats
-    d_slack: Floats
-    d_give: Floats
-    d_dual: Floats
-    matrix: Floats  # (n, n)
-    step: Floats  # (n,)
+# The iterate and its step, one line each of an array (9, m + 2 n): rows first, then the box's two sides.
+SLACK, GIVE, DUAL, LEFT, WEIGHT, SHIFT, D_SLACK, D_GIVE, D_DUAL = range(9)
+# GIVE is t, zero for rows that do not give way. LEFT is the price less the multiplier, kept by itself because
+# the difference would lose its digits. WEIGHT is D = 1 / (slack / dual + give / left).
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -89,90 +81,95 @@ def _add_rows(qp: ElasticQP, m: int, weights: Floats, out: Floats) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _factor(qp: ElasticQP, m: int, work: _Work) -> None:
+def _factor(qp: ElasticQP, m: int, w: Floats, M: Floats) -> None:
     """Factor H + A' D A."""
     n = qp.gradient.shape[0]
-    M, D = work.matrix, work.weight
     for i in range(m + 2 * n):
-        soft = work.give[i] / (qp.price[i] - work.dual[i]) if _gives(qp, m, i) else 0.0
-        D[i] = 1.0 / (work.slack[i] / work.dual[i] + soft)
+        soft = w[GIVE, i] / w[LEFT, i] if _gives(qp, m, i) else 0.0
+        w[WEIGHT, i] = 1.0 / (w[SLACK, i] / w[DUAL, i] + soft)
     for a in range(n):
         for b in range(a + 1):
             total = qp.hessian[a, b]
             for i in range(m):
-                total += D[i] * qp.rows[i, a] * qp.rows[i, b]
+                total += w[WEIGHT, i] * qp.rows[i, a] * qp.rows[i, b]
             M[a, b] = total
-        M[a, a] += D[m + a] + D[m + n + a]
+        M[a, a] += w[WEIGHT, m + a] + w[WEIGHT, m + n + a]
     cholesky(M, n)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _direction(qp: ElasticQP, m: int, d: Floats, target: float, second: bool, work: _Work) -> None:
+def _direction(
+    qp: ElasticQP,
+    m: int,
+    d: Floats,
+    target: float,
+    second: bool,
+    w: Floats,
+    factor: Floats,
+    step: Floats,
+) -> None:
     """Newton direction towards complementarity ``target``; ``second`` adds the corrector's products."""
     n = d.shape[0]
-    w = work
     for i in range(m + 2 * n):
-        by_slack, by_give, give = target / w.dual[i], 0.0, 0.0
+        by_slack, by_give, give = target / w[DUAL, i], 0.0, 0.0
         if second:
-            by_slack -= w.d_slack[i] * w.d_dual[i] / w.dual[i]
+            by_slack -= w[D_SLACK, i] * w[D_DUAL, i] / w[DUAL, i]
         if _gives(qp, m, i):
-            left = qp.price[i] - w.dual[i]
-            by_give, give = target / left, w.give[i]
+            left = w[LEFT, i]
+            by_give, give = target / left, w[GIVE, i]
             if second:
-                by_give += w.d_give[i] * w.d_dual[i] / left
+                by_give += w[D_GIVE, i] * w[D_DUAL, i] / left
         value = qp.values[i] if i < m else qp.radius[(i - m) % n]
-        residual = value + _row_dot(qp, m, i, d) + give - w.slack[i]
+        residual = value + _row_dot(qp, m, i, d) + give - w[SLACK, i]
         # what the row still misses once both complementarity conditions are solved for the slacks
-        w.shift[i] = residual + by_give - give - by_slack + w.slack[i]
+        w[SHIFT, i] = residual + by_give - give - by_slack + w[SLACK, i]
         # kept for the back-substitution
-        w.d_slack[i], w.d_give[i] = by_slack - w.slack[i], by_give - give
+        w[D_SLACK, i], w[D_GIVE, i] = by_slack - w[SLACK, i], by_give - give
     for a in range(n):
         total = -qp.gradient[a]
         for b in range(n):
             total -= qp.hessian[a, b] * d[b]
-        w.step[a] = total
+        step[a] = total
     # A' (dual - D shift), through d_dual as scratch
     for i in range(m + 2 * n):
-        w.d_dual[i] = w.dual[i] - w.weight[i] * w.shift[i]
-    _add_rows(qp, m, w.d_dual, w.step)
-    cholesky_solve(w.matrix, n, w.step)
+        w[D_DUAL, i] = w[DUAL, i] - w[WEIGHT, i] * w[SHIFT, i]
+    _add_rows(qp, m, w[D_DUAL], step)
+    cholesky_solve(factor, n, step)
     for i in range(m + 2 * n):
-        change = -w.weight[i] * (_row_dot(qp, m, i, w.step) + w.shift[i])
-        w.d_dual[i] = change
-        w.d_slack[i] -= w.slack[i] / w.dual[i] * change
+        change = -w[WEIGHT, i] * (_row_dot(qp, m, i, step) + w[SHIFT, i])
+        w[D_DUAL, i] = change
+        w[D_SLACK, i] -= w[SLACK, i] / w[DUAL, i] * change
         if _gives(qp, m, i):
-            w.d_give[i] += w.give[i] / (qp.price[i] - w.dual[i]) * change
+            w[D_GIVE, i] += w[GIVE, i] / w[LEFT, i] * change
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _longest(qp: ElasticQP, m: int, n: int, work: _Work) -> float:
+def _longest(qp: ElasticQP, m: int, n: int, w: Floats) -> float:
     """Longest step that keeps slacks and multipliers inside."""
     longest = 1e30
-    w = work
     for i in range(m + 2 * n):
-        if w.d_slack[i] < 0.0:
-            longest = min(longest, -w.slack[i] / w.d_slack[i])
-        if w.d_dual[i] < 0.0:
-            longest = min(longest, -w.dual[i] / w.d_dual[i])
+        if w[D_SLACK, i] < 0.0:
+            longest = min(longest, -w[SLACK, i] / w[D_SLACK, i])
+        if w[D_DUAL, i] < 0.0:
+            longest = min(longest, -w[DUAL, i] / w[D_DUAL, i])
         if _gives(qp, m, i):
-            if w.d_give[i] < 0.0:
-                longest = min(longest, -w.give[i] / w.d_give[i])
-            if w.d_dual[i] > 0.0:
-                longest = min(longest, (qp.price[i] - w.dual[i]) / w.d_dual[i])
+            if w[D_GIVE, i] < 0.0:
+                longest = min(longest, -w[GIVE, i] / w[D_GIVE, i])
+            if w[D_DUAL, i] > 0.0:
+                longest = min(longest, w[LEFT, i] / w[D_DUAL, i])
     return longest
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _gap(qp: ElasticQP, m: int, n: int, work: _Work, step: float) -> float:
+def _gap(qp: ElasticQP, m: int, n: int, w: Floats, step: float) -> float:
     """Mean complementarity after a step along the current direction."""
     total, count = 0.0, 0
-    w = work
     for i in range(m + 2 * n):
-        dual = w.dual[i] + step * w.d_dual[i]
-        total += (w.slack[i] + step * w.d_slack[i]) * dual
+        dual = w[DUAL, i] + step * w[D_DUAL, i]
+        total += (w[SLACK, i] + step * w[D_SLACK, i]) * dual
         count += 1
         if _gives(qp, m, i):
-            total += (w.give[i] + step * w.d_give[i]) * (qp.price[i] - dual)
+            total += (w[GIVE, i] + step * w[D_GIVE, i]) * (w[LEFT, i] - step * w[D_DUAL, i])
             count += 1
     return total / count
 
@@ -199,45 +196,41 @@ def solve_elastic_qp(qp: ElasticQP, m: int, d: Floats, multipliers: Floats) -> i
     """
     n = d.shape[0]
     size = m + 2 * n
-    w = _Work(
-        np.ones(size),
-        np.zeros(size),
-        np.ones(size),
-        np.zeros(size),
-        np.zeros(size),
-        np.zeros(size),
-        np.zeros(size),
-        np.zeros(size),
-        np.zeros((n, n)),
-        np.zeros(n),
-    )
-    d[:] = 0.0
-    for i in range(m):
-        w.slack[i] = max(qp.values[i], 0.0) + 0.1
-        if _gives(qp, m, i):
-            w.give[i] = max(-qp.values[i], 0.0) + 0.1
-        w.dual[i] = min(0.5 * qp.price[i], 0.5)
+    w, matrix, step = np.zeros((9, size)), np.zeros((n, n)), np.zeros(n)
     for j in range(n):
-        w.slack[m + j] = w.slack[m + n + j] = qp.radius[j]
-        w.dual[m + j] = w.dual[m + n + j] = 0.05 / qp.radius[j]
-    mu, iteration = _gap(qp, m, n, w, 0.0), 0
-    for iteration in range(MAX_ITERATIONS):
-        _factor(qp, m, w)
-        _direction(qp, m, d, 0.0, False, w)
-        step = min(1.0, _longest(qp, m, n, w))
-        ratio = _gap(qp, m, n, w, step) / mu
-        _direction(qp, m, d, mu * ratio**3, True, w)
-        step = min(1.0, FRACTION_TO_BOUNDARY * _longest(qp, m, n, w))
+        d[j] = 0.0
+    cost = 1.0
+    for i in range(m):
+        w[SLACK, i] = max(qp.values[i], 0.0) + 0.1
+        if _gives(qp, m, i):
+            cost = max(cost, -qp.price[i] * qp.values[i])
+            w[GIVE, i] = max(-qp.values[i], 0.0) + 0.1
+        w[DUAL, i] = min(0.5 * qp.price[i], 0.5)
+        w[LEFT, i] = qp.price[i] - w[DUAL, i]
+    for j in range(n):
+        w[SLACK, m + j] = w[SLACK, m + n + j] = qp.radius[j]
+        w[DUAL, m + j] = w[DUAL, m + n + j] = 0.05 / qp.radius[j]
+    mu, iterations = _gap(qp, m, n, w, 0.0), 0
+    while iterations < MAX_ITERATIONS:
+        iterations += 1
+        _factor(qp, m, w, matrix)
+        _direction(qp, m, d, 0.0, False, w, matrix, step)
+        length = min(1.0, _longest(qp, m, n, w))
+        ratio = _gap(qp, m, n, w, length) / mu
+        _direction(qp, m, d, mu * ratio**3, True, w, matrix, step)
+        length = min(1.0, FRACTION_TO_BOUNDARY * _longest(qp, m, n, w))
+        if not length > SHORTEST:  # rounding has the last word
+            break
         for j in range(n):
-            d[j] += step * w.step[j]
+            d[j] += length * step[j]
         for i in range(size):
-            w.slack[i] += step * w.d_slack[i]
-            w.give[i] += step * w.d_give[i]
-            w.dual[i] += step * w.d_dual[i]
-            w.d_slack[i] = w.d_give[i] = w.d_dual[i] = 0.0
+            w[SLACK, i] += length * w[D_SLACK, i]
+            w[GIVE, i] += length * w[D_GIVE, i]
+            w[DUAL, i] += length * w[D_DUAL, i]
+            w[LEFT, i] -= length * w[D_DUAL, i]
         mu = _gap(qp, m, n, w, 0.0)
-        if mu < TOLERANCE and step > 0.9:
+        if mu < TOLERANCE * cost:
             break
     for i in range(m):
-        multipliers[i] = w.dual[i]
-    return iteration + 1
+        multipliers[i] = w[DUAL, i]
+    return iterations

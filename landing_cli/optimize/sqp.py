@@ -3,11 +3,11 @@
     minimise  f(x)  subject to  c_i(x) = 0 (equality rows),  c_i(x) >= 0 (the others)
 
 The merit function is f + price * (sum of violations), where rows of the pool count only by the worst of
-them: rows that come and go along a path, such as local minima, leave the merit continuous. Each round the caller fills a ``LocalModel``;
-``propose`` solves the elastic quadratic program within the trust region, which always has a solution, and
-tells how much it expects the merit to fall. Nothing expected and nothing violated: a local optimum. Nothing
-expected at a high price, and still violated: a local minimum of the violation. Everything else is not
-converged, and says nothing about feasibility.
+them: rows that come and go along a path, such as local minima, leave the merit continuous. Each round the
+caller fills a ``LocalModel``; ``propose`` solves the elastic quadratic program within the trust region, which
+always has a solution, and tells how much it expects the merit to fall. Nothing expected and nothing
+violated: a local optimum. Nothing expected at a high price, and still violated: a local least of the
+violation. Everything else is not converged, and says nothing about feasibility.
 """
 
 from __future__ import annotations
@@ -66,19 +66,59 @@ def violation(values: Floats, equality: NDArray[np.bool_], pooled: NDArray[np.bo
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def convexify(hessian: Floats) -> None:
-    """Turn negative curvature into positive curvature of the same size, in place."""
-    n = hessian.shape[0]
-    values, vectors = np.linalg.eigh(hessian)
-    largest = max(abs(values[0]), abs(values[n - 1]), 1e-12)
-    if values[0] >= FLAT * largest:
+def convexify(matrix: Floats) -> None:
+    """Turn negative curvature into positive curvature of the same size, in place.
+
+    Jacobi's rotations give the eigenvalues of the small symmetric matrix.
+    """
+    n = matrix.shape[0]
+    A, V = np.zeros((n, n)), np.zeros((n, n))
+    scale = 0.0
+    for a in range(n):
+        V[a, a] = 1.0
+        for b in range(n):
+            A[a, b] = matrix[a, b]
+            scale = max(scale, abs(A[a, b]))
+    for _ in range(12):
+        off = 0.0
+        for p in range(n):
+            for q in range(p + 1, n):
+                off = max(off, abs(A[p, q]))
+                if abs(A[p, q]) > 1e-15 * scale:
+                    _rotate(A, V, p, q)
+        if off < 1e-13 * scale:
+            break
+    lowest = A[0, 0]
+    for i in range(n):
+        lowest = min(lowest, A[i, i])
+    floor = FLAT * max(scale, 1e-12)
+    if lowest >= floor:
         return
     for a in range(n):
         for b in range(n):
             total = 0.0
             for i in range(n):
-                total += max(abs(values[i]), FLAT * largest) * vectors[a, i] * vectors[b, i]
-            hessian[a, b] = total
+                total += max(abs(A[i, i]), floor) * V[a, i] * V[b, i]
+            matrix[a, b] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _rotate(A: Floats, V: Floats, p: int, q: int) -> None:
+    """Turn the plane of axes p and q so that A[p, q] vanishes; V collects the rotations."""
+    theta = 0.5 * (A[q, q] - A[p, p]) / A[p, q]
+    t = 1.0 / (abs(theta) + math.sqrt(theta * theta + 1.0))
+    if theta < 0.0:
+        t = -t
+    c = 1.0 / math.sqrt(t * t + 1.0)
+    s = t * c
+    for k in range(A.shape[0]):
+        x, y = A[k, p], A[k, q]
+        A[k, p], A[k, q] = c * x - s * y, s * x + c * y
+    for k in range(A.shape[0]):
+        x, y = A[p, k], A[q, k]
+        A[p, k], A[q, k] = c * x - s * y, s * x + c * y
+        x, y = V[k, p], V[k, q]
+        V[k, p], V[k, q] = c * x - s * y, s * x + c * y
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -116,13 +156,12 @@ def propose(
         How much the model expects the merit to fall.
     """
     n = step.shape[0]
-    qp.hessian[:n, :n] = model.hessian
-    qp.hessian[n, n] = FLAT
-    qp.gradient[:n] = model.gradient
-    qp.gradient[n] = price
-    qp.radius[:n] = radius
+    for a in range(n):
+        qp.gradient[a], qp.radius[a], qp.rows[0, a] = model.gradient[a], radius[a], 0.0
+        for b in range(n):
+            qp.hessian[a, b] = model.hessian[a, b]
+    qp.hessian[n, n], qp.gradient[n] = FLAT, price
     # the pool's violation is one more unknown: at least 0, and at least what each of its rows lacks
-    qp.rows[0, :] = 0.0
     qp.rows[0, n], qp.values[0], qp.price[0] = 1.0, 0.0, math.inf
     rows, worst = 1, 0.0
     for i in range(m):
@@ -139,7 +178,8 @@ def propose(
     qp.radius[n] = 1.0 + 2.0 * worst
     duals, step_and_pool = np.zeros(rows), np.zeros(n + 1)
     solve_elastic_qp(qp, rows, step_and_pool, duals)
-    step[:] = step_and_pool[:n]
+    for a in range(n):
+        step[a] = step_and_pool[a]
     after = np.zeros(m)
     rows = 1
     for i in range(m):

@@ -347,7 +347,8 @@ def search_extremal(
     for r in range(MAX_ROWS):
         search.multipliers[r] = 0.0
     now = _try(problem, target, normal, costates, here, search)
-    for rounds in range(1, MAX_ROUNDS + 1):
+    while rounds < MAX_ROUNDS:
+        rounds += 1
         if fresh:
             _renew_model(problem, target, normal, here, now, old_rows, search)
             fresh = False

@@ -6,7 +6,7 @@ distance from the ellipsoid at every dip of the path towards it (eq 5).
 
 Rows, each >= 0 or = 0, in scaled units:
 
-    thrust      (1 - (m T)^2) / 2 at a few points of the final arc
+    thrust      (1 - (m T)^2) / 2 at points of the final arc
     glide       n.w - cos(theta) |w| for w = 2 a_e + a_s (handover) and w = a_e (touchdown): r - r_c is s^2
                 times a mix of the two, and the cone is convex, so that both ends inside mean the whole arc
     handover    |xi(r_p)| - 1
@@ -35,6 +35,8 @@ Floats = NDArray[np.float64]
 # two ends would do for it alone; gravity along the arc bends the real thrust between them.
 ARC_FRACTIONS = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
 N_ARC = len(ARC_FRACTIONS)
+# Kept from the thrust bound at those points: between them the thrust bulges, and the search's steps are coarse.
+BULGE = 3e-5
 ROW_GLIDE = N_ARC
 ROW_HANDOVER = N_ARC + 2
 ROW_PROPELLANT = N_ARC + 3
@@ -200,7 +202,7 @@ def handover_rows(
                 d_log[a] -= width * (d_norm[a] + last_d_norm[a])
         mass = math.exp(log_mass)
         pull2 = (mass * norm) ** 2
-        values[j] = 0.5 * (1.0 - pull2)
+        values[j] = 0.5 * (1.0 - pull2) - BULGE
         for a in range(7):
             jacobian[j, a] = -pull2 * (d_norm[a] / norm + d_log[a])
             last_d_norm[a] = d_norm[a]
