@@ -73,6 +73,7 @@ def program(kind: str, n: int) -> tuple[ca.Function, dict[str, slice]]:
         "thrust": ca.vertcat(*thrust),
         "ellipsoid": ca.vertcat(*ellipsoid),
         "cone": cone,
+        "arrival": -ca.dot(X[:3, -1] / part["semi_axes"] ** 2, X[3:6, -1]),
     }
     rows, at = {}, 0
     for name, block in blocks.items():
@@ -94,9 +95,11 @@ def solve(problem: Problem, n: int, mode: str, x: np.ndarray, u: np.ndarray, tau
     k, rows = 2 * n + 1, info["rows"]
     lower, upper = np.zeros(info["count"]), np.zeros(info["count"])
     lower[rows["thrust"]] = -np.inf
-    upper[rows["ellipsoid"]] = upper[rows["cone"]] = np.inf
-    if problem.handover == "on_ellipsoid":
+    upper[rows["ellipsoid"]] = upper[rows["cone"]] = upper[rows["arrival"]] = np.inf
+    if problem.handover == "on_ellipsoid":  # reached from outside: between nodes the path could cheat
         upper[rows["ellipsoid"].stop - 1] = 0.0
+    else:
+        lower[rows["arrival"]] = -np.inf
     size = 10 * k + 1
     low, high = np.full(size, -np.inf), np.full(size, np.inf)
     low[6 : 7 * k : 7], high[6 : 7 * k : 7] = 0.2, 1.0 + 1e-9

@@ -48,7 +48,8 @@ def program(kind: str, n: int) -> tuple[ca.Function, dict[str, object]]:
     thrust += [ca.sumsqr(ratios[:, i]) - tau**2 for i in range(ratios.shape[1])]
     ellipsoid = [ca.sumsqr(X[:3, i] / part["semi_axes"]) - 1 for i in range(1, k)]
     j = j1 / (1 + part["t_final"]) + j2
-    blocks = [ca.vertcat(*dynamics), ca.vertcat(*thrust), ca.vertcat(*ellipsoid), cone]
+    arrival = -ca.dot(X[:3, -1] / part["semi_axes"] ** 2, X[3:6, -1])
+    blocks = [ca.vertcat(*dynamics), ca.vertcat(*thrust), ca.vertcat(*ellipsoid), ca.vertcat(cone, arrival)]
     edges = np.cumsum([b.shape[0] for b in blocks])
     z = ca.vertcat(ca.vec(X), ca.vec(U), tau)
     nlp = {"x": z, "p": p, "f": part["weight_tau"] * tau + part["weight_j"] * j, "g": ca.vertcat(*blocks)}
@@ -70,6 +71,8 @@ def solve(problem: Problem, n: int, mode: str, start: Local) -> tuple[str, float
     upper[thrust:] = np.inf
     if problem.handover == "on_ellipsoid":
         upper[ellipsoid - 1] = 0.0
+    else:
+        lower[-1] = -np.inf
     size = 7 * k + 3 * (k - 1) + 1
     low, high = np.full(size, -np.inf), np.full(size, np.inf)
     low[-1], high[-1] = (0.0, np.inf) if mode == "tau" else (1.0, 1.0)
