@@ -1,0 +1,85 @@
+"""The descent's own problem, frozen at a point, solved by the interior-point kernel and by Clarabel."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conic_oracles import ByClarabel, Sizes, iterate
+from landing_samples import landing_case
+
+from landing_cli.body.mesh import facet_centroids, facet_normals
+from landing_cli.flight.spacecraft import Spacecraft
+from landing_cli.optimize.conic_ipm import Model, Point, new_model, new_point, new_step
+from landing_cli.reach.descent_model import Layout, layout, new_cuts
+from landing_cli.reach.free_solve import Solver, cold_start
+from landing_cli.reach.records import LandingCase
+from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal, scale_case
+from landing_cli.reach.shooting import new_path
+
+INTERVALS = 12
+
+
+def solver_of(scaled: ScaledCase, plan: Layout) -> Solver:
+    """A solver with room for exactly this problem."""
+    sizes = INTERVALS, plan.n_cones, plan.n_rows
+    return Solver(
+        new_point(*sizes),
+        new_model(*sizes),
+        new_step(*sizes),
+        new_path(INTERVALS),
+        new_cuts(INTERVALS + 1),
+        np.zeros((plan.n_cones, 4)),
+    )
+
+
+def frozen(
+    case: LandingCase, tau_free: bool, cut_nodes: tuple[int, ...] = (), level: float = 1.0
+) -> tuple[Point, Model, Sizes]:
+    """The problem of a facet half-way round, linearised at the cold start."""
+    mesh = case.asteroid.mesh
+    scaled = scale_case(case, INTERVALS)
+    centroids, normals = facet_centroids(mesh), facet_normals(mesh)
+    facet = int(np.argmin(np.abs(normals @ case.position_m / np.linalg.norm(case.position_m) + 0.3)))
+    plan = layout(scaled, len(cut_nodes), 1e-3 if tau_free else 1.0, tau_free, level)
+    solver = solver_of(scaled, plan)
+    target = centroids[facet] / scaled.length_m
+    if cut_nodes:
+        # planes under a straight way to the handover, so that some of them are in the way
+        cold_start(scaled, target, normals[facet], plan, solver)
+        for c, k in enumerate(cut_nodes):
+            x = solver.path.position[k]
+            solver.cuts.node[c] = k
+            solver.cuts.normal[c] = ellipsoid_normal(scaled, scaled.node_cos[k], scaled.node_sin[k], *x)
+    cold_start(scaled, target, normals[facet], plan, solver)
+    return (
+        solver.point,
+        solver.model,
+        Sizes(INTERVALS, plan.n_cones, plan.n_equal, plan.n_rows, tau_free),
+    )
+
+
+PROBLEMS = {
+    "free": {},
+    "cuts": {"cut_nodes": (4, 5, 6, 7, 8, 9, 10), "level": 1.8},
+    "paper's thrust": {"case": {"final_stage_thrust": "paper"}},
+    "on the ellipsoid": {"case": {"handover": "on_ellipsoid"}},
+    "propellant": {"case": {"spacecraft": Spacecraft(2000.0, 20.0, 400.0, 1.9)}},
+}
+
+
+@pytest.mark.parametrize("tau_free", [False, True], ids=["energy", "margin"])
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_the_frozen_descent_is_solved_as_clarabel_solves_it(name: str, tau_free: bool) -> None:
+    given = dict(PROBLEMS[name])
+    point, model, sizes = frozen(landing_case(tof_s=850.0, **given.pop("case", {})), tau_free, **given)
+    truth = ByClarabel(point, model, sizes)
+    objective, iterations = iterate(point, model, sizes)
+    assert iterations < 20
+    assert objective == pytest.approx(truth.objective, abs=1e-7)
+    for field in ("thrust", "y", "multiplier"):
+        found, expected = getattr(point, field), getattr(truth, field)
+        atol = 2e-4 * (1.0 + np.abs(expected).max())
+        np.testing.assert_allclose(found, expected, rtol=0, atol=atol, err_msg=field)
+    inequalities = point.multiplier[sizes.equal :]
+    if inequalities.size:  # the constraint that the problem is named for is at work in it
+        assert inequalities.min() < -1e-3
