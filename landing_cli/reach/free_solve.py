@@ -38,7 +38,9 @@ Floats = NDArray[np.float64]
 
 STALLED, CONVERGED, CERTIFIED, BLOCKED = 0, 1, 2, 3
 
-TOLERANCE = 2e-7
+# Rows and cones are met, and the duality gap closed, to these. J answers to the square of the stationarity
+# residual and tau to its product with the step, so that one may be larger by far.
+TOLERANCE, GAP_TOLERANCE, DUAL_TOLERANCE = 2e-7, 2e-6, 1e-4
 FIRST_CERTIFICATE = 4
 # A least-energy solve is given up when its linearised problem needs this much thrust.
 FIRST_BLOCKED, BLOCKED_LEVEL = 8, 1.0 + 1e-4
@@ -194,8 +196,8 @@ def solve(case, target, normal, plan, retake_from, tube, arc_bound, limit, solve
         if (
             iteration > DEFECT_PERIOD
             and primal < TOLERANCE
-            and dual < 10.0 * TOLERANCE * scale
-            and gap < 10.0 * TOLERANCE * scale
+            and dual < DUAL_TOLERANCE * scale
+            and gap < GAP_TOLERANCE * scale
         ):
             status = CONVERGED
             break
