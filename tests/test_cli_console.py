@@ -84,10 +84,23 @@ def test_progress_without_a_terminal_is_a_line_now_and_then(
         for done in (100, 200, 220, 1000, 7300):  # the first 100 were there already
             progress(done, 7300)
     assert capsys.readouterr().err.splitlines() == [
-        "200/7300 facets, 10 a second, 11 min 50 s left",
-        "1000/7300 facets, 11.25 a second, 9 min 20 s left",
-        "7300/7300 facets, 72 a second",
+        "200/7300 facets",
+        "1000/7300 facets, 11.47 a second, 9 min 09 s left",
+        "7300/7300 facets, 80.45 a second",
     ]
+
+
+def test_the_rate_forgets_what_came_before_the_first_answer_and_what_is_long_ago() -> None:
+    progress = console.Progress("facets")
+    seen = [(0.0, 0), (40.0, 10), (41.0, 20), (60.0, 210), (75.0, 360), (100.0, 1360), (110.0, 1760)]
+    rates = []
+    for now, done in seen:
+        progress._begun_at = 0
+        rates.append(progress._rate(now, done))
+    assert rates[:2] == [0.0, 0.0]  # compiling, then one answer
+    assert rates[2] == 10.0
+    assert rates[4] == 10.0
+    assert rates[-1] == (1760 - 360) / (110.0 - 75.0)
 
 
 def test_progress_on_a_terminal_shows_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -45,9 +45,15 @@ class FakePipeline:
     asked: Any = None
 
     def run(
-        self, loaded: Any, output: Path, options: Options, progress: Callable[[int, int], None]
+        self,
+        loaded: Any,
+        output: Path,
+        options: Options,
+        progress: Callable[[int, int], None],
+        say: Callable[[str], None],
     ) -> Outcome:
         self.asked = (loaded.scenario, output, options)
+        say("compiling")
         progress(4, 4)
         output.parent.mkdir(exist_ok=True)
         run = run_from_result(read(stored_run(output, self.verdicts)))
@@ -71,7 +77,7 @@ def test_a_run_prints_its_table_and_says_where_the_result_is(
     assert main("reach", ["run", "probe", "--jobs", "3", "--set", "reach.tof_s=800"]) == 0
     out, err = capsys.readouterr()
     assert out.splitlines()[1].split()[:4] == ["top_700s", "4", "2", "2"]
-    assert err == "read probe.yaml\nwrote runs/probe-reach-run.h5\n"
+    assert err == "read probe.yaml\ncompiling\nwrote runs/probe-reach-run.h5\n"
     scenario, output, options = pipeline.asked
     assert scenario.reach.tof_s == (800,)
     assert output == Path("runs/probe-reach-run.h5")

@@ -48,6 +48,8 @@ def stored_run(path: Path, verdicts: list[Verdict], j: float = 2.0, tof_s: float
         "reachable": reachable,
         "unreachable": verdicts.count(Verdict.UNREACHABLE),
         "unresolved": verdicts.count(Verdict.UNRESOLVED),
+        "proved": 1,
+        "paths_through_rock": 3,
         "reachable_area_m2": 5000.0 * reachable,
         "delta_v_m_s": {"min": 1.0, "median": 2.0, "max": None},
     }
@@ -65,7 +67,7 @@ def test_show_prints_the_table_of_cases(tmp_path: Path, capsys: pytest.CaptureFi
     path = stored_run(tmp_path / "a.h5", [YES, YES, NO, NO])
     assert main("landing", ["results", "show", str(path)]) == 0
     out, err = capsys.readouterr()
-    assert out.splitlines()[1].split() == ["top_700s", "4", "2", "2", "0", "10000", "1", "2", "-"]
+    assert out.splitlines()[1].split() == "top_700s 4 2 2 1 0 10000 1 2 - 3".split()
     assert "reach run, version 0.1.0, complete" in err
     assert "reach run rock.yaml" in err
 
@@ -86,6 +88,8 @@ def test_show_json_is_what_scripts_rely_on(tmp_path: Path, capsys: pytest.Captur
             "reachable": 2,
             "unreachable": 2,
             "unresolved": 0,
+            "proved": 1,
+            "paths_through_rock": 3,
             "reachable_area_m2": 10000.0,
             "delta_v_m_s": {"min": 1.0, "median": 2.0, "max": None},
         }

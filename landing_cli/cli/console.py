@@ -6,6 +6,7 @@ import json
 import math
 import sys
 import time
+from collections import deque
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 from landing_cli.cli.guard import tell
 
 PLAIN_LINE_EVERY_S = 5.0
+RATE_WINDOW_S = 30.0
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]], title: str = "") -> None:
@@ -126,7 +128,8 @@ class Progress:
         self._unit = unit
         self._quiet = quiet
         self._began = time.monotonic()
-        self._first: int | None = None
+        self._begun_at: int | None = None
+        self._recent: deque[tuple[float, int]] = deque()
         self._last_line = self._began
         self._bar: Any = None
         self._task: Any = None
@@ -150,8 +153,8 @@ class Progress:
         """
         if self._quiet:
             return
-        if self._first is None:  # what a resumed run finds done says nothing about its speed
-            self._first = done
+        if self._begun_at is None:
+            self._begun_at = done
         if sys.stderr.isatty():
             self._draw(done, total)
         else:
@@ -159,14 +162,29 @@ class Progress:
 
     def _write_line(self, done: int, total: int) -> None:
         now = time.monotonic()
+        rate = self._rate(now, done)
         if now - self._last_line < PLAIN_LINE_EVERY_S and done < total:
             return
         if done >= total and self._last_line == self._began and now - self._began < 1.0:
             return  # it took no time: nothing to follow
         self._last_line = now
-        rate = (done - (self._first or 0)) / max(now - self._began, 1e-9)
+        speed = f", {rate:.4g} a second" if rate > 0 else ""
         left = f", {_duration((total - done) / rate)} left" if rate > 0 and done < total else ""
-        tell(f"{done}/{total} {self._unit}, {rate:.4g} a second{left}")
+        tell(f"{done}/{total} {self._unit}{speed}{left}")
+
+    def _rate(self, now: float, done: int) -> float:
+        """Units a second of late; 0 while nothing is known about it.
+
+        What a resumed run finds done says nothing about its speed, and neither does the time up to the first
+        answer, which compilation may have taken.
+        """
+        if done == self._begun_at:
+            return 0.0
+        self._recent.append((now, done))
+        while len(self._recent) > 2 and now - self._recent[1][0] >= RATE_WINDOW_S:
+            self._recent.popleft()
+        since, before = self._recent[0]
+        return (done - before) / (now - since) if now > since else 0.0
 
     def _draw(self, done: int, total: int) -> None:
         if self._bar is None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,11 +23,26 @@ from landing_cli.cli.options import (
 from landing_cli.errors import NothingFeasible, PartialResult
 
 if TYPE_CHECKING:
-    from landing_cli.reach.stored import ReachRun
+    from landing_cli.reach.stored import CaseResult, ReachRun
+    from landing_cli.reach.verify import CaseReport
     from landing_cli.scenario.load import LoadedScenario
 
-_COUNTS = ("case", "facets", "reachable", "unreachable", "unresolved", "reachable_area_m2")
+_COUNTS = ("case", "facets", "reachable", "unreachable", "proved", "unresolved", "reachable_area_m2")
 _SECTION = ("P_d", "P_r", "P_e", "n", "N", "ratio", "iou", "misclassified")
+
+_VERIFICATION = (
+    "case",
+    "flown",
+    "miss_m",
+    "speed_mm_s",
+    "over_thrust",
+    "in_ellipsoid",
+    "over_glide_deg",
+    "polyhedron",
+    "median_miss_m",
+    "worst_miss_m",
+    "verdict",
+)
 
 app = new_program("Where on an asteroid the spacecraft can land.")
 
@@ -85,7 +102,7 @@ def run(
     guard.hint_on_interrupt(f"finished facets are kept: continue with --resume (output {path})")
     options = RunOptions(plan=plan, resume=resume, force=force, compare=compare)
     with voice.progress("facets") as progress:
-        outcome = run_reach(loaded, path, options, progress)
+        outcome = run_reach(loaded, path, options, progress, voice.say)
     guard.hint_on_interrupt("")
     if outcome.up_to_date:
         voice.say(f"{path} is up to date: same scenario, shape and version (--force solves again)")
@@ -120,15 +137,103 @@ def print_run(run: ReachRun, path: Path, as_json: bool) -> None:
         console.print_json({"run": str(path), "scenario": run.asteroid.name, "cases": cases})
         return
     rows = [
-        [*(case[key] for key in _COUNTS), *(case["delta_v_m_s"][key] for key in ("min", "median", "max"))]
+        [
+            *(case[key] for key in _COUNTS),
+            *(case["delta_v_m_s"][key] for key in ("min", "median", "max")),
+            case["paths_through_rock"],
+        ]
         for case in cases
     ]
-    columns = [*_COUNTS, "dv_min_m_s", "dv_median_m_s", "dv_max_m_s"]
+    columns = [*_COUNTS, "dv_min_m_s", "dv_median_m_s", "dv_max_m_s", "paths_through_rock"]
     console.print_table(columns, rows, title=f"Reachable domain: {run.asteroid.name}")
     sections = [(case["case"], case["section"]) for case in cases if case.get("section")]
     if sections:
         rows = [[name, *(section.get(key) for key in _SECTION)] for name, section in sections]
         console.print_table(["case", *_SECTION], rows, title="Section and expansion")
+
+
+def print_facet(cases: Sequence[CaseResult], facet: int, path: Path, as_json: bool) -> None:
+    """Print what is known about one facet: a sentence a case, and its columns; vectors for a single case.
+
+    Parameters
+    ----------
+    cases : sequence of CaseResult
+        Of one run.
+    facet : int
+        0-based.
+    path : Path
+        The run's file.
+    as_json : bool
+        Print JSON.
+    """
+    from landing_cli.reach.facet_story import facet_facts, tell_facet
+
+    told = {result.case.name: tell_facet(result, facet) for result in cases}
+    facts = [facet_facts(result, facet) for result in cases]
+    if as_json:
+        known = [
+            {"case": name, "told": sentence, **values}
+            for (name, sentence), values in zip(told.items(), facts, strict=True)
+        ]
+        console.print_json({"run": str(path), "facet": facet, "cases": known})
+        return
+    for name, sentence in told.items():
+        console.print_text(f"{name}: {sentence}")
+    shown = [
+        key
+        for key, value in facts[0].items()
+        if key != "facet" and not (isinstance(value, list) and facts[1:])
+    ]
+    rows = [[key, *(_short(values[key]) for values in facts)] for key in shown]
+    console.print_table(["quantity", *told], rows)
+
+
+def print_verification(reports: Sequence[CaseReport], path: Path, as_json: bool) -> None:
+    """Print what the re-flight of a run found: a table, or JSON with every check.
+
+    Parameters
+    ----------
+    reports : sequence of CaseReport
+        One a case.
+    path : Path
+        The run's file.
+    as_json : bool
+        Print JSON.
+    """
+    if as_json:
+        cases = [{**asdict(report), "verified": report.verified} for report in reports]
+        verified = all(report.verified for report in reports)
+        console.print_json({"run": str(path), "verified": verified, "cases": cases})
+        return
+    console.print_table(
+        _VERIFICATION, [_verification_row(report) for report in reports], title="Verification"
+    )
+
+
+def _verification_row(report: CaseReport) -> list[object]:
+    def worst(*names: str, scale: float = 1.0) -> float | None:
+        values = [report.worst[name].value * scale for name in names if name in report.worst]
+        return max(0.0, *values) if values else None
+
+    model = report.polyhedron
+    return [
+        report.case,
+        report.flown,
+        worst("touchdown_miss_m"),
+        worst("touchdown_speed_m_s", scale=1e3),
+        worst("descent_thrust_excess", "final_thrust_excess"),
+        worst("ellipsoid_depth"),
+        worst("glide_slope_excess_deg"),
+        model and model.facets,
+        model and model.median_m,
+        model and model.worst_m,
+        "verified" if report.verified else "FAILED",
+    ]
+
+
+def _short(value: object) -> object:
+    """Vectors on one line; scalars as they are."""
+    return " ".join(f"{x:.5g}" for x in value) if isinstance(value, list) else value
 
 
 def _say_plan(loaded: LoadedScenario, path: Path, as_json: bool) -> None:

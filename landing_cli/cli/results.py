@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import os
+from enum import StrEnum
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from landing_cli.cli import console, reach
-from landing_cli.cli.options import Json, Quiet, ResultFile, new_group
-from landing_cli.errors import InputRefused
+from landing_cli.cli.options import Force, Json, Output, Quiet, ResultFile, new_group
+from landing_cli.errors import InputRefused, OutputRefused, UsageError, VerificationFailed
 
 if TYPE_CHECKING:
+    from landing_cli.reach.stored import CaseResult, ReachRun
     from landing_cli.results.store import StoredResult
 
 app = new_group("Look at, export, draw, verify and compare result files.")
@@ -21,10 +24,42 @@ app = new_group("Look at, export, draw, verify and compare result files.")
 # missions whose results this version reads: how to print them; each brings stored, figures, verify
 MISSIONS: dict[str, ModuleType] = {"reach": reach}
 
+CaseName = Annotated[
+    str | None, typer.Option("--case", metavar="NAME", help="One case, as north_pole_700s; all unless given.")
+]
+Facet = Annotated[
+    int | None, typer.Option("--facet", metavar="N", help="One facet, 0-based, in the shape file's order.")
+]
+
+
+class ExportedTable(StrEnum):
+    """What can be exported."""
+
+    FACETS = "facets"
+    BOUNDARY = "boundary"
+    TRAJECTORY = "trajectory"
+    SUMMARY = "summary"
+
+
+class ExportFormat(StrEnum):
+    """How it can be written."""
+
+    CSV = "csv"
+    JSON = "json"
+    PLY = "ply"
+    VTP = "vtp"
+    OBJ = "obj"
+    OEM = "oem"
+
+
+MAP_FORMATS = (ExportFormat.PLY, ExportFormat.VTP, ExportFormat.OBJ)
+
 
 @app.command()
-def show(run: ResultFile, as_json: Json = False, quiet: Quiet = False) -> None:
-    """Print what a result holds: the table of its cases, and on stderr how it was made."""
+def show(
+    run: ResultFile, case: CaseName = None, facet: Facet = None, as_json: Json = False, quiet: Quiet = False
+) -> None:
+    """Print what a result holds: the table of its cases, or what is known about one facet, and why."""
     result = _read(run)
     voice = console.Console(quiet)
     identity = result.identity
@@ -32,7 +67,78 @@ def show(run: ResultFile, as_json: Json = False, quiet: Quiet = False) -> None:
     for name in ("command_line", "finished_utc", "wall_s", "machine"):
         if name in result.provenance:
             voice.say(f"  {name}: {result.provenance[name]}")
-    MISSIONS[result.mission].print_run(_run_of(result), run, as_json)
+    found, printer = _run_of(result), MISSIONS[result.mission]
+    cases = _module(result, "exports").chosen_cases(found, case)
+    if facet is not None:
+        printer.print_facet(cases, facet, run, as_json)
+    else:
+        printer.print_run(type(found)(cases), run, as_json)
+
+
+@app.command()
+def verify(
+    run: ResultFile,
+    case: CaseName = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Fly every facet under the polyhedron too, not a sample.")
+    ] = False,
+    jobs: reach.Jobs = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Fly every stored control again by another integrator and check all that the result says about it.
+
+    In the scenario's own gravity each flight must meet its touchdown to 5 cm and 1 mm/s and keep every
+    constraint; what does not ends with exit code 5. How far the same controls miss under the gravity of
+    the mesh as a uniform polyhedron, the error of the gravity model, is reported and fails nothing.
+    """
+    result = _read(run)
+    cases = _module(result, "exports").chosen_cases(_run_of(result), case)
+    with console.Console(quiet).progress("flights") as progress:
+        reports = _module(result, "verify").verify_run(
+            cases,
+            polyhedron_for_all=everything,
+            jobs=len(os.sched_getaffinity(0)) if jobs is None else jobs,
+            progress=progress,
+        )
+    MISSIONS[result.mission].print_verification(reports, run, as_json)
+    failing = [report for report in reports if not report.verified]
+    if failing:
+        more = f"; {len(failing)} of {len(reports)} cases fail" if len(reports) > 1 else ""
+        worst = max(failing, key=lambda report: report.badness)
+        raise VerificationFailed(f"{worst.reason}{more}", where=str(run), fix="--json lists every check")
+
+
+@app.command()
+def export(
+    run: ResultFile,
+    table: Annotated[
+        ExportedTable | None, typer.Option(help="What; facets unless given, trajectory for oem.")
+    ] = None,
+    case: CaseName = None,
+    facet: Facet = None,
+    form: Annotated[
+        ExportFormat,
+        typer.Option("--format", help="csv, json; ply, vtp, obj: a map of facets; oem: a trajectory."),
+    ] = ExportFormat.CSV,
+    output: Output = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a table, a map or a trajectory of a result for other programs; to stdout without -o."""
+    chosen = table or (ExportedTable.TRAJECTORY if form is ExportFormat.OEM else ExportedTable.FACETS)
+    _refuse_nonsense(chosen, form, facet, output)
+    result = _read(run)
+    if output is not None:
+        _refuse_existing(output, run, force)
+    data = _exported(result, chosen, form, case, facet)
+    if output is None:
+        console.print_text(data.decode())
+        return
+    from landing_cli.results.disk import replace_file
+
+    replace_file(output, data)
+    console.Console(quiet).say(f"wrote {output}")
 
 
 @app.command()
@@ -58,6 +164,64 @@ def diff(
         console.print_json({"equal": old.digest == new.digest, "cases": cases})
     else:
         console.print_table(list(cases[0]), [list(case.values()) for case in cases])
+
+
+def _refuse_nonsense(
+    table: ExportedTable, form: ExportFormat, facet: int | None, output: Path | None
+) -> None:
+    """Refuse what cannot be written in the chosen form, before anything is read."""
+    flown = table is ExportedTable.TRAJECTORY
+    if form in MAP_FORMATS and table is not ExportedTable.FACETS:
+        raise UsageError(
+            f"{form} is a map of facets, not of a {table}", fix="take csv or json for this table"
+        )
+    if form is ExportFormat.OEM and not flown:
+        raise UsageError(f"an oem holds a trajectory, not the {table} table", fix="take csv or json for it")
+    if flown and facet is None:
+        raise UsageError("a trajectory leads to one facet", fix="name it with --facet")
+    if facet is not None and not flown:
+        raise UsageError(f"--facet does not go with the {table} table", fix="add --table trajectory")
+    if form is ExportFormat.PLY and output is None:
+        raise UsageError("ply is binary", fix="name a file with -o")
+
+
+def _refuse_existing(path: Path, run: Path, force: bool) -> None:
+    if path.exists() and path.samefile(run):
+        raise OutputRefused("is the result that is exported", where=str(path), fix="take another name")
+    if path.exists() and not force:
+        raise OutputRefused("is there already", where=str(path), fix="take another name, or --force")
+
+
+def _exported(
+    result: StoredResult, table: ExportedTable, form: ExportFormat, case: str | None, facet: int | None
+) -> bytes:
+    """Make what is to be written."""
+    run, exports = _run_of(result), _module(result, "exports")
+    if form in MAP_FORMATS:
+        return bytes(exports.export_map(run, form.value, case))
+    if facet is None:
+        return str(exports.export_table(run, table.value, form.value, case)).encode()
+    flown = _module(result, "flown").flown_trajectory(_one_case(run, case), facet)
+    if form is not ExportFormat.OEM:
+        return str(exports.export_table(run, table.value, form.value, case, flown)).encode()
+    from datetime import UTC, datetime
+
+    from landing_cli.results.oem import to_oem
+    from landing_cli.scenario.load import parse
+
+    body = parse(result.identity.scenario, "the stored scenario").tree["body"]
+    created = datetime.now(UTC).isoformat()
+    return to_oem(flown, run.asteroid.name, "lander", body.get("epoch_utc"), created).encode()
+
+
+def _one_case(run: ReachRun, case: str | None) -> CaseResult:
+    from landing_cli.reach.exports import chosen_cases
+
+    cases = chosen_cases(run, case)
+    if len(cases) > 1:
+        names = ", ".join(result.case.name for result in cases)
+        raise UsageError("a trajectory is of one case", where="--case", fix=f"take one of {names}")
+    return cases[0]
 
 
 def _read(path: Path) -> StoredResult:

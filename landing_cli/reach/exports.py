@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
+
 from landing_cli.errors import InputRefused
 from landing_cli.flight.trajectory import Trajectory
 from landing_cli.reach.records import FACET_COLUMNS
@@ -11,6 +13,7 @@ from landing_cli.reach.stored import CaseResult, ReachRun
 from landing_cli.results.maps import WRITERS, on_every_facet
 from landing_cli.results.tables import (
     Table,
+    TableColumn,
     group_table,
     stacked,
     summary_table,
@@ -20,6 +23,7 @@ from landing_cli.results.tables import (
 )
 from landing_cli.results.tree import table_group
 
+_BOUNDARY_PARTS = ("section", "ring", "expansion", "boundary", "domain")
 TEXT_FORMATS: Mapping[str, Callable[[Table], str]] = {"csv": to_csv, "json": to_json}
 
 
@@ -50,6 +54,11 @@ def boundary_table(result: CaseResult) -> Table:
     result : CaseResult
         The case.
 
+    Returns
+    -------
+    Table
+        Facets of the section, the ring, the expansions, the boundary and the domain, below each other.
+
     Raises
     ------
     InputRefused
@@ -61,7 +70,14 @@ def boundary_table(result: CaseResult) -> Table:
             where=result.case.name,
             fix="run with --set reach.method=section, or with --compare",
         )
-    return group_table(result.boundary)
+    lists = result.boundary.members
+    if len({result.boundary.dataset(name).dims[0] for name in lists}) == 1:
+        return group_table(result.boundary)
+    facets = {name.removesuffix("_facets"): result.boundary.dataset(name).data for name in lists}
+    facets["domain"] = np.flatnonzero(facets["domain"])
+    parts = [np.full(len(facets[part]), part) for part in _BOUNDARY_PARTS]
+    rows = [np.asarray(facets[part], dtype=np.int64) for part in _BOUNDARY_PARTS]
+    return Table({"part": TableColumn(np.concatenate(parts)), "facet": TableColumn(np.concatenate(rows))})
 
 
 def chosen_cases(run: ReachRun, case: str | None) -> tuple[CaseResult, ...]:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.body.gravity.field import GravityField
-from landing_cli.body.mesh import facet_centroids
 from landing_cli.errors import InputRefused
 from landing_cli.flight.legs import CostateLeg, FinalArcLeg, Leg, ThrustNodesLeg
 from landing_cli.flight.replay import replay
@@ -22,6 +21,32 @@ def rows_with_flight(solutions: FacetSolutions) -> NDArray[np.bool_]:
     rows = solutions.rows
     controlled = (rows["thrust_nodes"] > 0) | np.isfinite(rows["costates"]).all(axis=1)
     return np.asarray(controlled & np.isfinite(rows["handover_position_m"]).all(axis=1))
+
+
+def asked_row(result: CaseResult, facet: int) -> int:
+    """Find the row of a facet.
+
+    Parameters
+    ----------
+    result : CaseResult
+        The case.
+    facet : int
+        0-based.
+
+    Raises
+    ------
+    InputRefused
+        If there is no such facet, or it was not solved.
+    """
+    case, facets = result.case, result.solutions.rows["facet"]
+    where, count = f"--facet {facet}", len(case.asteroid.mesh.faces)
+    if not 0 <= facet < count:
+        raise InputRefused("no such facet", where=where, fix=f"take one of 0 to {count - 1}")
+    row = int(np.searchsorted(facets, facet))
+    if row == len(facets) or facets[row] != facet:
+        fix = "run with --set reach.method=traverse, or take another facet"
+        raise InputRefused(f"{case.name} never asked for this facet", where=where, fix=fix)
+    return row
 
 
 def row_of(result: CaseResult, facet: int) -> int:
@@ -39,22 +64,15 @@ def row_of(result: CaseResult, facet: int) -> int:
     InputRefused
         If there is no such facet, it was not solved, or no flight to it was found; says why.
     """
-    case, rows = result.case, result.solutions.rows
-    where, count = f"--facet {facet}", len(case.asteroid.mesh.faces)
-    if not 0 <= facet < count:
-        raise InputRefused("no such facet", where=where, fix=f"take one of 0 to {count - 1}")
-    row = int(np.searchsorted(rows["facet"], facet))
-    if row == len(rows) or rows["facet"][row] != facet:
-        fix = "run with --set reach.method=traverse, or take another facet"
-        raise InputRefused(f"{case.name} never asked for this facet", where=where, fix=fix)
+    row = asked_row(result, facet)
     if not rows_with_flight(result.solutions)[row]:
-        known = rows[row]
-        told = f"no flight to it in {case.name}: it is {Verdict(int(known['verdict'])).name.lower()}"
+        known = result.solutions.rows[row]
+        told = f"no flight to it in {result.case.name}: it is {Verdict(int(known['verdict'])).name.lower()}"
         if facet in result.lost:
             told += f", lost because {result.lost[facet]}"
         elif np.isfinite(known["violation"]):
             told += f", and the best attempt breaks a constraint by {known['violation']:.3g} of its scale"
-        raise InputRefused(told, where=where, fix="take a facet whose verdict is reachable")
+        raise InputRefused(told, where=f"--facet {facet}", fix="take a facet whose verdict is reachable")
     return row
 
 
@@ -89,7 +107,8 @@ def flown_legs(case: LandingCase, solutions: FacetSolutions, row: int) -> tuple[
             case.spacecraft.thrust_max_n,
             gravity,
         )
-    target = facet_centroids(case.asteroid.mesh)[known["facet"]]
+    mesh = case.asteroid.mesh
+    target = mesh.vertices[mesh.faces[known["facet"]]].mean(axis=0)
     handover = known["handover_position_m"].copy(), known["handover_velocity_m_s"].copy()
     return descent, FinalArcLeg(case.final_stage_s, *handover, target, gravity)
 
