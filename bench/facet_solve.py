@@ -27,7 +27,7 @@ from bench import slsqp_baseline
 from bench.peak import measured_peak
 from landing_cli.body.gravity.coefficients import degree2_from_mesh
 from landing_cli.body.mesh import facet_centroids, facet_normals
-from landing_cli.reach.free_descent import prepare, solve_prepared
+from landing_cli.reach.free_descent import prepare, solve_prepared, survey
 from landing_cli.reach.records import LandingCase, Verdict
 from landing_cli.scenario.build import build
 from landing_cli.scenario.load import load
@@ -83,7 +83,7 @@ def timed(method: str, facets: np.ndarray, solve: Callable[[int], tuple[bool, fl
 
 def ours(case: LandingCase, facets: np.ndarray) -> Row:
     """The package's solver, on all facets in one call, the case prepared and the code compiled beforehand."""
-    prepared = prepare(case)
+    prepared = prepare(case, survey(case))
     solve_prepared(prepared, facets[:1])
     begun = time.process_time()
     rows = solve_prepared(prepared, facets).rows
@@ -190,8 +190,8 @@ def main() -> None:
         share = every.reachable.sum() / total
         print(f"ours over all {total} facets: {1e3 * every.cpu_s:.3f} ms CPU a facet, {share:.1%} reachable")
         begun = time.process_time()
-        prepare(case)
-        print(f"preparation of the case, once: {1e3 * (time.process_time() - begun):.0f} ms CPU")
+        prepare(case, survey(case))
+        print(f"survey and preparation, once a case: {1e3 * (time.process_time() - begun):.0f} ms CPU")
 
 
 if __name__ == "__main__":
