@@ -67,7 +67,7 @@ def test_show_prints_the_table_of_cases(tmp_path: Path, capsys: pytest.CaptureFi
     path = stored_run(tmp_path / "a.h5", [YES, YES, NO, NO])
     assert main("landing", ["results", "show", str(path)]) == 0
     out, err = capsys.readouterr()
-    assert out.splitlines()[1].split() == "top_700s 4 2 2 1 0 10000 1 2 - 3".split()
+    assert out.splitlines()[1].split() == ["top_700s", "4", "2", "2", "1", "0", "10000", "1", "2", "-", "3"]
     assert "reach run, version 0.1.0, complete" in err
     assert "reach run rock.yaml" in err
 
