@@ -102,7 +102,7 @@ class Step(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def new_point(n_nodes, n_cones, n_rows):
+def new_point(n_nodes: int, n_cones: int, n_rows: int) -> Point:
     """Return a zeroed iterate."""
     return Point(
         np.zeros((n_nodes, 3)),
@@ -116,7 +116,7 @@ def new_point(n_nodes, n_cones, n_rows):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def new_model(n_nodes, n_cones, n_rows):
+def new_model(n_nodes: int, n_cones: int, n_rows: int) -> Model:
     """Return a zeroed model."""
     return Model(
         np.zeros(n_rows),
@@ -134,7 +134,7 @@ def new_model(n_nodes, n_cones, n_rows):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def new_step(n_nodes, n_cones, n_rows):
+def new_step(n_nodes: int, n_cones: int, n_rows: int) -> Step:
     """Return zeroed scratch space for an iteration."""
     return Step(
         np.zeros((n_nodes, 3)),
@@ -164,7 +164,7 @@ def new_step(n_nodes, n_cones, n_rows):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fill_row_pull(point, model, n_rows):
+def fill_row_pull(point: Point, model: Model, n_rows: int) -> None:
     """Fill ``model.row_pull`` from the rows and their multipliers."""
     model.row_pull[:, :] = 0.0
     for r in range(n_rows):
@@ -175,7 +175,9 @@ def fill_row_pull(point, model, n_rows):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def residuals(point, model, step, n_equal, n_rows, n_cones, tau_free):
+def residuals(
+    point: Point, model: Model, step: Step, n_equal: int, n_rows: int, n_cones: int, tau_free: bool
+) -> tuple[float, float, float]:
     """Fill the residuals of the optimality conditions.
 
     Returns
@@ -227,7 +229,7 @@ def residuals(point, model, step, n_equal, n_rows, n_cones, tau_free):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _scale_cones(point, model, step, n_cones):
+def _scale_cones(point: Point, model: Model, step: Step, n_cones: int) -> None:
     """Scale the cones on y and start the order-7 system with their Hessians."""
     reduced = step.reduced
     for a in range(Y_SIZE):
@@ -246,7 +248,7 @@ def _scale_cones(point, model, step, n_cones):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _eliminate_nodes(point, model, step, n_rows):
+def _eliminate_nodes(point: Point, model: Model, step: Step, n_rows: int) -> None:
     """Scale every node's cone and add its share of the Schur complement."""
     schur, coupling = step.schur, step.coupling
     tau = point.y[0]
@@ -280,7 +282,9 @@ def _eliminate_nodes(point, model, step, n_rows):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def factorise(point, model, step, n_equal, n_rows, n_cones, tau_free):
+def factorise(
+    point: Point, model: Model, step: Step, n_equal: int, n_rows: int, n_cones: int, tau_free: bool
+) -> None:
     """Scale all cones, eliminate the nodes, and factor the two dense systems."""
     schur, coupling, solved = step.schur, step.coupling, step.solved_coupling
     _scale_cones(point, model, step, n_cones)
@@ -318,7 +322,17 @@ def factorise(point, model, step, n_equal, n_rows, n_cones, tau_free):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _right_hand_side(point, model, step, n_equal, n_rows, n_cones, target, corrector, tau_free):
+def _right_hand_side(
+    point: Point,
+    model: Model,
+    step: Step,
+    n_equal: int,
+    n_rows: int,
+    n_cones: int,
+    target: float,
+    corrector: bool,
+    tau_free: bool,
+) -> None:
     """Fill the right-hand sides; d_thrust holds H^-1 q of each node on return.
 
     The predictor aims at zero complementarity without the second-order term: its shift is -z.
@@ -376,7 +390,7 @@ def _right_hand_side(point, model, step, n_equal, n_rows, n_cones, target, corre
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _solve_dense(step, n_rows):
+def _solve_dense(step: Step, n_rows: int) -> None:
     """Solve B dy - M dlambda = rhs_rows and H dy + B' dlambda = rhs_y."""
     cholesky_solve(step.schur, n_rows, step.rhs_rows)
     for a in range(Y_SIZE):
@@ -393,7 +407,7 @@ def _solve_dense(step, n_rows):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _recover_cones(point, model, step, n_equal, n_rows, n_cones):
+def _recover_cones(point: Point, model: Model, step: Step, n_equal: int, n_rows: int, n_cones: int) -> float:
     """Directions of the cones on y and of the inequality rows; the longest step they allow."""
     longest = UNBOUNDED
     for j in range(n_cones):
@@ -422,7 +436,7 @@ def _recover_cones(point, model, step, n_equal, n_rows, n_cones):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _recover_nodes(point, model, step, n_rows):
+def _recover_nodes(point: Point, model: Model, step: Step, n_rows: int) -> float:
     """Directions of the thrust nodes and their duals; the longest step they allow."""
     longest = UNBOUNDED
     tau, d_tau = point.y[0], step.d_y[0]
@@ -449,7 +463,17 @@ def _recover_nodes(point, model, step, n_rows):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _direction(point, model, step, n_equal, n_rows, n_cones, target, corrector, tau_free):
+def _direction(
+    point: Point,
+    model: Model,
+    step: Step,
+    n_equal: int,
+    n_rows: int,
+    n_cones: int,
+    target: float,
+    corrector: bool,
+    tau_free: bool,
+) -> float:
     """Solve the Newton system for one right-hand side; return the longest feasible step."""
     _right_hand_side(point, model, step, n_equal, n_rows, n_cones, target, corrector, tau_free)
     _solve_dense(step, n_rows)
@@ -460,7 +484,17 @@ def _direction(point, model, step, n_equal, n_rows, n_cones, target, corrector, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def advance(point, model, step, n_equal, n_rows, n_cones, gap, smallest_target, tau_free):
+def advance(
+    point: Point,
+    model: Model,
+    step: Step,
+    n_equal: int,
+    n_rows: int,
+    n_cones: int,
+    gap: float,
+    smallest_target: float,
+    tau_free: bool,
+) -> float:
     """One predictor-corrector step, in place, from the residuals of :func:`residuals`.
 
     Returns

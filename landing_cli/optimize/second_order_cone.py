@@ -13,14 +13,20 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
 
 TINY = 1e-300
 UNBOUNDED = 1e9
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def scaling_point(s0, s1, s2, s3, z0, z1, z2, z3):
+def scaling_point(
+    s0: float, s1: float, s2: float, s3: float, z0: float, z1: float, z2: float, z3: float
+) -> tuple[float, float, float, float, float]:
     """Scaling point w and 1/beta^2 of an interior primal-dual pair.
 
     Returns
@@ -42,14 +48,18 @@ def scaling_point(s0, s1, s2, s3, z0, z1, z2, z3):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def apply_scaling(v0, v1, v2, v3, beta, x0, x1, x2, x3):
+def apply_scaling(
+    v0: float, v1: float, v2: float, v3: float, beta: float, x0: float, x1: float, x2: float, x3: float
+) -> tuple[float, float, float, float]:
     """W x for v = (w + e) / sqrt(2 (w0 + 1))."""
     t = 2.0 * (v0 * x0 + v1 * x1 + v2 * x2 + v3 * x3)
     return beta * (t * v0 - x0), beta * (t * v1 + x1), beta * (t * v2 + x2), beta * (t * v3 + x3)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def apply_inverse_scaling(v0, v1, v2, v3, beta, x0, x1, x2, x3):
+def apply_inverse_scaling(
+    v0: float, v1: float, v2: float, v3: float, beta: float, x0: float, x1: float, x2: float, x3: float
+) -> tuple[float, float, float, float]:
     """W^-1 x for v = (w + e) / sqrt(2 (w0 + 1))."""
     t = 2.0 * (v0 * x0 - v1 * x1 - v2 * x2 - v3 * x3)
     inverse = 1.0 / beta
@@ -62,7 +72,17 @@ def apply_inverse_scaling(v0, v1, v2, v3, beta, x0, x1, x2, x3):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def apply_inverse_scaling_squared(w0, w1, w2, w3, inverse_beta2, x0, x1, x2, x3):
+def apply_inverse_scaling_squared(
+    w0: float,
+    w1: float,
+    w2: float,
+    w3: float,
+    inverse_beta2: float,
+    x0: float,
+    x1: float,
+    x2: float,
+    x3: float,
+) -> tuple[float, float, float, float]:
     """W^-2 x."""
     t = 2.0 * (w0 * x0 - w1 * x1 - w2 * x2 - w3 * x3)
     return (
@@ -74,7 +94,14 @@ def apply_inverse_scaling_squared(w0, w1, w2, w3, inverse_beta2, x0, x1, x2, x3)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def complementarity_shift(w, inverse_beta2, z, affine_ds, affine_dz, target):
+def complementarity_shift(
+    w: Floats,
+    inverse_beta2: float,
+    z: Floats,
+    affine_ds: tuple[float, float, float, float] | Floats,
+    affine_dz: Floats,
+    target: float,
+) -> tuple[float, float, float, float]:
     """Return the constant o of the Newton step dz = o - W^-2 ds.
 
     It solves lambda o (W dz + W^-1 ds) = target e - lambda o lambda - (W^-1 ds_a) o (W dz_a), where
@@ -115,7 +142,9 @@ def complementarity_shift(w, inverse_beta2, z, affine_ds, affine_dz, target):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def longest_step(s0, s1, s2, s3, d0, d1, d2, d3):
+def longest_step(
+    s0: float, s1: float, s2: float, s3: float, d0: float, d1: float, d2: float, d3: float
+) -> float:
     """Largest t with s + t d in the cone, for s inside it (capped at ``UNBOUNDED``)."""
     a = d0 * d0 - d1 * d1 - d2 * d2 - d3 * d3
     b = s0 * d0 - s1 * d1 - s2 * d2 - s3 * d3

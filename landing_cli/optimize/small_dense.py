@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
 
 SMALLEST_PIVOT = 1e-40
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def cholesky(matrix, n):
+def cholesky(matrix: Floats, n: int) -> None:
     """Factor the leading n x n block in place: its lower triangle becomes L with L L' = matrix.
 
     Pivots are floored, so a block that round-off made indefinite still yields a direction.
@@ -28,7 +32,7 @@ def cholesky(matrix, n):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def cholesky_solve(factor, n, x):
+def cholesky_solve(factor: Floats, n: int, x: Floats) -> None:
     """Solve L L' x = x in place for the factor of :func:`cholesky`."""
     for i in range(n):
         total = x[i]

@@ -25,6 +25,8 @@ from numpy.typing import NDArray
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.bounds import largest_acceleration_outside
 from landing_cli.body.gravity.field_values import accelerations
+from landing_cli.optimize.conic_ipm import Model, Point
+from landing_cli.reach.descent_model import Layout
 from landing_cli.reach.scaled_case import ScaledCase, gravity_on_arc
 
 Floats = NDArray[np.float64]
@@ -73,7 +75,7 @@ def gravity_tube(scaled: ScaledCase, bounds: GravityBounds) -> Floats:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _drift_work(case, target, q, p):
+def _drift_work(case: ScaledCase, target: Floats, q: Floats, p: Floats) -> float:
     """-lambda' E for the drift without gravity: E_r = r_c - r0 - v0, E_v = w x r_c - v0."""
     r, v = case.position, case.velocity
     total = 0.0
@@ -83,7 +85,7 @@ def _drift_work(case, target, q, p):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _descent_integrals(case, tube, q, p):
+def _descent_integrals(case: ScaledCase, tube: Floats, q: Floats, p: Floats) -> tuple[float, float]:
     """Upper bounds of int |p + q s| / m and int |p + q s| gbar by the trapezoid rule."""
     n = tube.shape[0]
     h = 1.0 / n
@@ -101,7 +103,7 @@ def _descent_integrals(case, tube, q, p):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _dual_feasible(case, model, multiplier, n_rows, duals):
+def _dual_feasible(case: ScaledCase, model: Model, multiplier: Floats, n_rows: int, duals: Floats) -> None:
     """Make ``duals`` satisfy sum_j A_j' z_j = A_y' lambda, by way of the balls at the arc's two ends."""
     arcs = case.arc_fractions.shape[0]
     for j in range(arcs, arcs + 2):
@@ -131,7 +133,16 @@ def _dual_feasible(case, model, multiplier, n_rows, duals):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def certified_thrust_level(case, target, tube, arc_bound, model, multiplier, cone_dual, duals):
+def certified_thrust_level(
+    case: ScaledCase,
+    target: Floats,
+    tube: Floats,
+    arc_bound: float,
+    model: Model,
+    multiplier: Floats,
+    cone_dual: Floats,
+    duals: Floats,
+) -> float:
     """Lower bound on the thrust level; above 1 it proves the facet unreachable.
 
     Parameters
@@ -181,7 +192,9 @@ def certified_thrust_level(case, target, tube, arc_bound, model, multiplier, con
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def linearised_thrust_level(case, plan, point, model, duals):
+def linearised_thrust_level(
+    case: ScaledCase, plan: Layout, point: Point, model: Model, duals: Floats
+) -> float:
     """Lower bound on the thrust level of the problem as it is linearised now, tangent planes included.
 
     The same weak duality with frozen gravity, masses and planes: no proof about the facet, but once it

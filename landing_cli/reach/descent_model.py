@@ -24,9 +24,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from landing_cli.optimize.conic_ipm import fill_row_pull
-from landing_cli.reach.scaled_case import ellipsoid_normal, gravity_on_arc
-from landing_cli.reach.shooting import fly, pull_back
+from landing_cli.optimize.conic_ipm import Model, Point, fill_row_pull
+from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal, gravity_on_arc
+from landing_cli.reach.shooting import Path, fly, pull_back
 
 Floats = NDArray[np.float64]
 
@@ -54,13 +54,13 @@ class Layout(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def new_cuts(size):
+def new_cuts(size: int) -> Cuts:
     """Room for ``size`` cuts."""
     return Cuts(np.zeros(size, dtype=np.int64), np.zeros((size, 3)))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def layout(case, n_cuts, energy_weight, tau_free, level):
+def layout(case: ScaledCase, n_cuts: int, energy_weight: float, tau_free: bool, level: float) -> Layout:
     """Count rows and cones for a case with ``n_cuts`` tangent planes."""
     n_equal = 7 if case.on_ellipsoid else 6
     n_rows = n_equal + n_cuts + (1 if case.propellant < 1.0 else 0)
@@ -69,7 +69,7 @@ def layout(case, n_cuts, energy_weight, tau_free, level):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def arc_weights(sigma, final_time):
+def arc_weights(sigma: float, final_time: float) -> tuple[float, float, float, float, float, float]:
     """Weights of (a_e, a_s) in a*, in r - r_c, and in v at time-to-go sigma T.
 
     Returns
@@ -88,7 +88,7 @@ def arc_weights(sigma, final_time):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fill_handover_rows(case, model):
+def fill_handover_rows(case: ScaledCase, model: Model) -> None:
     """Constant derivatives of the six matching rows with respect to y."""
     spin = case.spin
     _, _, r_e, r_s, v_e, v_s = arc_weights(1.0, case.final_time)
@@ -106,7 +106,7 @@ def fill_handover_rows(case, model):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fill_arc_cones(case, model):
+def fill_arc_cones(case: ScaledCase, model: Model) -> None:
     """Constant derivatives of the final stage's thrust with respect to (a_e, a_s).
 
     Thrust per mass is a* - g + 2 w x v + w x (w x r) when compensated, a* in the paper's reading.
@@ -129,7 +129,7 @@ def fill_arc_cones(case, model):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fill_glide_cones(case, normal, model):
+def fill_glide_cones(case: ScaledCase, normal: Floats, model: Model) -> None:
     """Glide slope at handover (2 a_e + a_s) and at touchdown (a_e), about the facet normal."""
     first = case.arc_fractions.shape[0]
     n0, n1, n2 = normal[0], normal[1], normal[2]
@@ -157,7 +157,7 @@ def fill_glide_cones(case, normal, model):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fill_energy(case, rho, model):
+def fill_energy(case: ScaledCase, rho: float, model: Model) -> None:
     """Hessian of rho J in y: J2 = T/6 (|a_e|^2 + a_e . a_s + |a_s|^2)."""
     weight = rho * case.final_time / 6.0
     model.y_hessian[:, :] = 0.0
@@ -167,7 +167,7 @@ def fill_energy(case, rho, model):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def handover_point(case, target, y):
+def handover_point(case: ScaledCase, target: Floats, y: Floats) -> tuple[float, float, float]:
     """Handover position of the final arc, solver axes."""
     _, _, r_e, r_s, _, _ = arc_weights(1.0, case.final_time)
     return (
@@ -178,7 +178,7 @@ def handover_point(case, target, y):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def refresh_arc(case, target, handover_mass, model, y):
+def refresh_arc(case: ScaledCase, target: Floats, handover_mass: float, model: Model, y: Floats) -> float:
     """Gravity and mass along the final arc; returns the mass at touchdown.
 
     Gravity enters the thrust cones as an offset, the mass as the radius tau / m of each ball. Both are
@@ -215,7 +215,7 @@ def refresh_arc(case, target, handover_mass, model, y):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _refresh_matching(case, target, path, model, y):
+def _refresh_matching(case: ScaledCase, target: Floats, path: Path, model: Model, y: Floats) -> None:
     """Values and thrust derivatives of the six matching rows."""
     n = path.gradient.shape[0]
     _, _, _, _, v_e, v_s = arc_weights(1.0, case.final_time)
@@ -236,7 +236,7 @@ def _refresh_matching(case, target, path, model, y):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _refresh_handover_on_ellipsoid(case, target, model, point):
+def _refresh_handover_on_ellipsoid(case: ScaledCase, target: Floats, model: Model, point: Point) -> None:
     """Row 6: the handover on the ellipsoid, |xi(r_p)| = 1, linearised in y.
 
     Where its multiplier is positive the constraint bends the way of the objective, and its curvature
@@ -263,7 +263,9 @@ def _refresh_handover_on_ellipsoid(case, target, model, point):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _refresh_cuts(case, path, model, cuts, plan, retake):
+def _refresh_cuts(
+    case: ScaledCase, path: Path, model: Model, cuts: Cuts, plan: Layout, retake: float
+) -> None:
     """Rows of the tangent planes; ``retake`` moves each to the current position of its node."""
     for c in range(plan.n_cuts):
         k, n, r = cuts.node[c], cuts.normal[c], plan.n_equal + c
@@ -277,7 +279,9 @@ def _refresh_cuts(case, path, model, cuts, plan, retake):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _refresh_propellant(case, point, path, model, r, touchdown_mass):
+def _refresh_propellant(
+    case: ScaledCase, point: Point, path: Path, model: Model, r: int, touchdown_mass: float
+) -> None:
     """Row r: propellant left, P - (1 - m_touchdown) >= 0, with an isotropic bound of its curvature."""
     n = path.gradient.shape[0]
     h, flow = 1.0 / n, case.mass_flow
@@ -308,7 +312,7 @@ def _refresh_propellant(case, point, path, model, r, touchdown_mass):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_mass_gradient(case, point, path, model):
+def _add_mass_gradient(case: ScaledCase, point: Point, path: Path, model: Model) -> float:
     """Gradient through the mass: -c h lambda_m F / |F|, the mass costate carried back from the handover.
 
     The rows hold the mass fixed; this term makes the stationarity residual exact (Zhao 2022, eqs 8, 11).
@@ -332,7 +336,17 @@ def _add_mass_gradient(case, point, path, model):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def refresh(case, target, plan, cuts, iteration, retake_from, point, path, model):
+def refresh(
+    case: ScaledCase,
+    target: Floats,
+    plan: Layout,
+    cuts: Cuts,
+    iteration: int,
+    retake_from: int,
+    point: Point,
+    path: Path,
+    model: Model,
+) -> tuple[float, float]:
     """Linearise the whole problem at ``point``: fly it, and fill every row, cone and gradient.
 
     The tangent planes follow the path from iteration ``retake_from`` on.
@@ -348,7 +362,7 @@ def refresh(case, target, plan, cuts, iteration, retake_from, point, path, model
     h, rho, y = 1.0 / n, plan.energy_weight, point.y
     fly(case, point.thrust, path)
     fill_energy(case, rho, model)
-    touchdown_mass = refresh_arc(case, target, path.mass[n], model, y)
+    touchdown_mass = refresh_arc(case, target, float(path.mass[n]), model, y)
     _refresh_matching(case, target, path, model, y)
     energy = 0.0
     for k in range(n):

@@ -19,20 +19,21 @@ from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level
 from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 # Closer to the centre than this, the deepest point does not tell which side is shorter.
 UNDECIDED = 0.1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def last_cut_node(case, position):
+def last_cut_node(case: ScaledCase, position: Floats) -> int:
     """Last node that may carry a tangent plane: the handover has a row of its own when on the ellipsoid."""
     n = position.shape[0] - 1
     return n - 1 if case.on_ellipsoid else n
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def lowest_level(case, position):
+def lowest_level(case: ScaledCase, position: Floats) -> float:
     """Least |xi| over the nodes of a path that may carry a tangent plane."""
     lowest = 1e9
     for k in range(1, last_cut_node(case, position) + 1):
@@ -42,7 +43,7 @@ def lowest_level(case, position):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def lowest_level_between(case, thrust, samples):
+def lowest_level_between(case: ScaledCase, thrust: Floats, samples: Floats) -> float:
     """Least |xi| of an accurate flight of ``thrust``, between the nodes too; fills ``samples``."""
     steps = samples.shape[0] - 1
     fly_accurately(case, thrust, samples)
@@ -55,7 +56,7 @@ def lowest_level_between(case, thrust, samples):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _unit_coordinates(case, k, x, xi):
+def _unit_coordinates(case: ScaledCase, k: int, x: Floats, xi: Floats) -> None:
     """Xi of a solver-axes position at node k."""
     c, s = case.node_cos[k], case.node_sin[k]
     xi[0] = (c * x[0] + s * x[1]) * case.inverse_axes[0]
@@ -64,7 +65,7 @@ def _unit_coordinates(case, k, x, xi):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _plane_normal(case, k, u, normal):
+def _plane_normal(case: ScaledCase, k: int, u: Floats, normal: Floats) -> None:
     """Normal, in solver axes, of the plane that touches the ellipsoid where xi = u at node k."""
     c, s = case.node_cos[k], case.node_sin[k]
     a, b = u[0] * case.inverse_axes[0], u[1] * case.inverse_axes[1]
@@ -72,7 +73,7 @@ def _plane_normal(case, k, u, normal):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _dip(case, position):
+def _dip(case: ScaledCase, position: Floats) -> tuple[int, int, int]:
     """Nodes before the entry, after the exit, and at the deepest point of a path's dip."""
     n = last_cut_node(case, position)
     first, last, deepest, lowest = n, 1, n, 1e9
@@ -87,7 +88,7 @@ def _dip(case, position):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def arc_cuts(case, position, side, node, normal):
+def arc_cuts(case: ScaledCase, position: Floats, side: float, node: Ints, normal: Floats) -> int:
     """Fill tangent planes along an arc around the ellipsoid; return their number.
 
     Parameters
@@ -131,7 +132,9 @@ def arc_cuts(case, position, side, node, normal):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def freeze_on_path(case, position, node, normal, count, level):
+def freeze_on_path(
+    case: ScaledCase, position: Floats, node: Ints, normal: Floats, count: int, level: float
+) -> int:
     """Move the planes to a path, add one wherever a node is below ``level``; return their number."""
     xi = np.empty(3)
     for k in range(1, last_cut_node(case, position) + 1):
@@ -169,13 +172,13 @@ def lowest_levels_between(case: ScaledCase, thrusts: Floats, out: Floats) -> Non
 def arc_cuts_many(case: ScaledCase, positions: Floats, side: float, cuts: CutBatch) -> None:
     """Fill the planes of a batch along arcs on one side of the ellipsoid; see :func:`arc_cuts`."""
     for i in range(positions.shape[0]):
-        cuts.count[i] = arc_cuts(case, positions[i], side, cuts.node[i], cuts.normal[i])
+        cuts.planes[i] = arc_cuts(case, positions[i], side, cuts.node[i], cuts.normal[i])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def freeze_many(case: ScaledCase, positions: Floats, levels: Floats, cuts: CutBatch) -> None:
     """Move the planes of a batch to its paths; see :func:`freeze_on_path`."""
     for i in range(positions.shape[0]):
-        cuts.count[i] = freeze_on_path(
-            case, positions[i], cuts.node[i], cuts.normal[i], cuts.count[i], levels[i]
+        cuts.planes[i] = freeze_on_path(
+            case, positions[i], cuts.node[i], cuts.normal[i], cuts.planes[i], levels[i]
         )

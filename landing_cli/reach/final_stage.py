@@ -37,7 +37,9 @@ class ArcMeasures(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def end_accelerations(rx, ry, rz, vx, vy, vz, duration_s):
+def end_accelerations(
+    rx: float, ry: float, rz: float, vx: float, vy: float, vz: float, duration_s: float
+) -> tuple[float, float, float, float, float, float]:
     """Total acceleration at touchdown and at handover for r_p - r_c = (rx, ry, rz) and v_p.
 
     Returns
@@ -56,7 +58,9 @@ def end_accelerations(rx, ry, rz, vx, vy, vz, duration_s):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def arc_state(a, target, duration_s, s):
+def arc_state(
+    a: tuple[float, float, float, float, float, float], target: Floats, duration_s: float, s: float
+) -> tuple[float, float, float, float, float, float]:
     """Position and velocity on the arc at time-to-go s.
 
     Returns
@@ -77,7 +81,7 @@ def arc_state(a, target, duration_s, s):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _angle(x, y, z, normal):
+def _angle(x: float, y: float, z: float, normal: Floats) -> float:
     along = x * normal[0] + y * normal[1] + z * normal[2]
     square = x * x + y * y + z * z
     return math.atan2(math.sqrt(max(square - along * along, 0.0)), along)
@@ -85,8 +89,17 @@ def _angle(x, y, z, normal):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def measure_arc(
-    handover, handover_mass, target, normal, duration_s, spin, exhaust_velocity, kind, params, points
-):
+    handover: Floats,
+    handover_mass: float,
+    target: Floats,
+    normal: Floats,
+    duration_s: float,
+    spin: float,
+    exhaust_velocity: float,
+    kind: int,
+    params: Floats,
+    points: Floats,
+) -> ArcMeasures:
     """Fly a final arc in closed form and measure it.
 
     Parameters
@@ -123,7 +136,7 @@ def measure_arc(
     peak = planned = 0.0
     for j in range(ARC_SAMPLES + 1):
         f = 1.0 - j / ARC_SAMPLES
-        x, y, z, vx, vy, vz = arc_state(a, target, T, f * T)
+        x, y, z, vx, vy, _vz = arc_state(a, target, T, f * T)
         points[j, 0], points[j, 1], points[j, 2] = x, y, z
         ax, ay, az = a[0] + f * (a[3] - a[0]), a[1] + f * (a[4] - a[1]), a[2] + f * (a[5] - a[2])
         gx, gy, gz = acceleration(kind, params, x, y, z)

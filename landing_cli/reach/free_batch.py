@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from landing_cli.reach.descent_model import layout
-from landing_cli.reach.free_solve import CONVERGED, new_solver, solve
+from landing_cli.reach.descent_model import Layout, layout
+from landing_cli.reach.free_solve import CONVERGED, Solver, new_solver, solve
 from landing_cli.reach.records import Binding
 from landing_cli.reach.scaled_case import ScaledCase
 from landing_cli.reach.shooting import pull_back
@@ -32,7 +32,7 @@ HANDOVER = int(Binding.HANDOVER) - 1
 class CutBatch(NamedTuple):
     """Tangent planes of every facet of a batch (n facets, room for C planes each)."""
 
-    count: Ints  # (n,)
+    planes: Ints  # (n,) how many
     node: Ints  # (n, C)
     normal: Floats  # (n, C, 3) solver axes
 
@@ -75,7 +75,7 @@ def no_cuts(size: int, intervals: int) -> CutBatch:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _keep_costates(case, plan, solver, mass_costate, out):
+def _keep_costates(case: ScaledCase, plan: Layout, solver: Solver, mass_costate: float, out: Floats) -> None:
     """Carry the multipliers back to the start and turn them into the rotating frame.
 
     With v_inertial = v + w x r the costates are lambda_v and lambda_r - w x lambda_v.
@@ -109,7 +109,7 @@ def _keep_costates(case, plan, solver, mass_costate, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _keep_pressure(case, plan, solver, out):
+def _keep_pressure(case: ScaledCase, plan: Layout, solver: Solver, out: Floats) -> None:
     """What a relative loosening of each constraint takes off the objective (envelope theorem)."""
     point = solver.point
     arcs = case.arc_fractions.shape[0]
@@ -170,7 +170,7 @@ def solve_many(
     """
     solver = new_solver(case)
     for i in range(targets.shape[0]):
-        count = cuts.count[i]
+        count = cuts.planes[i]
         for c in range(count):
             solver.cuts.node[c] = cuts.node[i, c]
             solver.cuts.normal[c] = cuts.normal[i, c]

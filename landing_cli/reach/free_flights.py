@@ -111,13 +111,13 @@ def _solve_again(
     """Solve chosen facets again with planes frozen on their paths, updating flights and cuts."""
     if len(chosen) == 0:
         return
-    part = CutBatch(cuts.count[chosen], cuts.node[chosen], cuts.normal[chosen])
+    part = CutBatch(cuts.planes[chosen], cuts.node[chosen], cuts.normal[chosen])
     freeze_many(question.case, flights.position[chosen], touch[chosen], part)
     again = _solve(_subset(question, chosen), part, level[chosen], NEVER, CUT_LIMIT)
     again.iterations[:] += flights.iterations[chosen]
     _take(flights, chosen, again, np.arange(len(chosen)))
     flights.iterations[chosen] = again.iterations
-    cuts.count[chosen], cuts.node[chosen], cuts.normal[chosen] = part
+    cuts.planes[chosen], cuts.node[chosen], cuts.normal[chosen] = part
 
 
 def _solve(question: Question, cuts: CutBatch, level: Floats, retake_from: int, limit: int) -> Batch:

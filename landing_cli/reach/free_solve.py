@@ -26,12 +26,14 @@ from landing_cli.optimize.conic_ipm import (
 from landing_cli.reach.certificate import certified_thrust_level, linearised_thrust_level
 from landing_cli.reach.descent_model import (
     Cuts,
+    Layout,
     fill_arc_cones,
     fill_glide_cones,
     fill_handover_rows,
     new_cuts,
     refresh,
 )
+from landing_cli.reach.scaled_case import ScaledCase
 from landing_cli.reach.shooting import Path, fly, measure_defect, new_path
 
 Floats = NDArray[np.float64]
@@ -70,7 +72,7 @@ class Outcome(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def new_solver(case):
+def new_solver(case: ScaledCase) -> Solver:
     """Allocate a solver for a scaled case."""
     n = case.mid_cos.shape[0]
     n_cones = case.arc_fractions.shape[0] + 2
@@ -86,7 +88,7 @@ def new_solver(case):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _start_thrust(case, target, normal, solver):
+def _start_thrust(case: ScaledCase, target: Floats, normal: Floats, solver: Solver) -> None:
     """Least-energy thrust to a plausible handover, from the unpowered flight's miss, clipped.
 
     F = f0 + f1 s with int s F = E_r and int F = E_v, where E is the miss in position and velocity.
@@ -120,7 +122,7 @@ def _start_thrust(case, target, normal, solver):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def cold_start(case, target, normal, plan, solver):
+def cold_start(case: ScaledCase, target: Floats, normal: Floats, plan: Layout, solver: Solver) -> None:
     """Set the iterate to a well-centred point; the objective's scale sets the duals."""
     point, model = solver.point, solver.model
     _start_thrust(case, target, normal, solver)
@@ -153,7 +155,17 @@ def cold_start(case, target, normal, plan, solver):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def solve(case, target, normal, plan, retake_from, tube, arc_bound, limit, solver):
+def solve(
+    case: ScaledCase,
+    target: Floats,
+    normal: Floats,
+    plan: Layout,
+    retake_from: int,
+    tube: Floats,
+    arc_bound: float,
+    limit: int,
+    solver: Solver,
+) -> Outcome:
     """Solve one facet from a cold start.
 
     Parameters

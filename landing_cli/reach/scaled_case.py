@@ -91,7 +91,7 @@ def scale_case(case: LandingCase, n_intervals: int) -> ScaledCase:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def core_scale(case, x, y, z):
+def core_scale(case: ScaledCase, x: float, y: float, z: float) -> float:
     """Metres per unit of length, more where a body-frame point lies in the ellipsoid's core."""
     a, b, c = x * case.inverse_axes[0], y * case.inverse_axes[1], z * case.inverse_axes[2]
     level = a * a + b * b + c * c
@@ -101,7 +101,9 @@ def core_scale(case, x, y, z):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def gravity_and_gradient(case, cosine, sine, x, y, z):
+def gravity_and_gradient(
+    case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float
+) -> tuple[float, float, float, float, float, float, float, float, float]:
     """Gravity and its gradient at a point in solver axes, the body being turned by the given angle.
 
     Returns
@@ -130,7 +132,9 @@ def gravity_and_gradient(case, cosine, sine, x, y, z):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def gravity_at_angle(case, angle, x, y, z):
+def gravity_at_angle(
+    case: ScaledCase, angle: float, x: float, y: float, z: float
+) -> tuple[float, float, float]:
     """Gravity at a point in solver axes, scaled, the body being turned by ``angle``, rad."""
     cosine, sine = math.cos(angle), math.sin(angle)
     bx, by = cosine * x + sine * y, cosine * y - sine * x
@@ -141,7 +145,7 @@ def gravity_at_angle(case, angle, x, y, z):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def gravity_on_arc(case, x, y, z):
+def gravity_on_arc(case: ScaledCase, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Gravity at a point of the final arc, scaled, body axes; arcs may fly deep in the ellipsoid."""
     L, p = case.length_m, 1.0 / case.acceleration_m_s2
     ax, ay, az = acceleration(case.gravity_kind, case.gravity_params, L * x, L * y, L * z)
@@ -149,7 +153,7 @@ def gravity_on_arc(case, x, y, z):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def ellipsoid_level(case, cosine, sine, x, y, z):
+def ellipsoid_level(case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float) -> float:
     """|xi| = sqrt(r' Re r) of a point in solver axes: 1 on the ellipsoid, homogeneous of degree 1."""
     a = (cosine * x + sine * y) * case.inverse_axes[0]
     b = (cosine * y - sine * x) * case.inverse_axes[1]
@@ -158,7 +162,9 @@ def ellipsoid_level(case, cosine, sine, x, y, z):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def ellipsoid_normal(case, cosine, sine, x, y, z):
+def ellipsoid_normal(
+    case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float
+) -> tuple[float, float, float]:
     """Gradient n of |xi| at a point, in solver axes: n . r = |xi|, and n . r >= 1 is a tangent plane."""
     wx, wy, wz = case.inverse_axes[0], case.inverse_axes[1], case.inverse_axes[2]
     a, b, c = (cosine * x + sine * y) * wx, (cosine * y - sine * x) * wy, z * wz

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from landing_cli.reach.scaled_case import gravity_and_gradient, gravity_at_angle
+from landing_cli.reach.scaled_case import ScaledCase, gravity_and_gradient, gravity_at_angle
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class Path(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def new_path(n_intervals):
+def new_path(n_intervals: int) -> Path:
     """A zeroed path."""
     return Path(
         np.zeros((n_intervals + 1, 3)),
@@ -47,7 +47,7 @@ def new_path(n_intervals):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fly(case, thrust, path):
+def fly(case: ScaledCase, thrust: Floats, path: Path) -> None:
     """Fly the descent stage from the initial state under ``thrust`` (N, 3), filling ``path``."""
     n = thrust.shape[0]
     h = 1.0 / n
@@ -90,7 +90,9 @@ def fly(case, thrust, path):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def pull_back(path, end, p0, p1, p2, q0, q1, q2, row):
+def pull_back(
+    path: Path, end: int, p0: float, p1: float, p2: float, q0: float, q1: float, q2: float, row: Floats
+) -> tuple[float, float, float, float, float, float]:
     """Derivative of p . r(t_end) + q . v(t_end) with respect to every thrust interval.
 
     The adjoint of :func:`fly` run backwards from node ``end``; mass is held.
@@ -131,7 +133,7 @@ def pull_back(path, end, p0, p1, p2, q0, q1, q2, row):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fly_accurately(case, thrust, samples):
+def fly_accurately(case: ScaledCase, thrust: Floats, samples: Floats) -> None:
     """Fly the descent stage by Runge-Kutta 4, with exact mass, in the same number of steps an interval.
 
     Parameters
@@ -186,7 +188,7 @@ def fly_accurately(case, thrust, samples):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def measure_defect(case, thrust, path):
+def measure_defect(case: ScaledCase, thrust: Floats, path: Path) -> None:
     """Set ``path.defect`` to what an accurate flight of ``thrust`` adds to :func:`fly`'s end state."""
     n = thrust.shape[0]
     path.defect[:] = 0.0
