@@ -142,6 +142,42 @@ def export(
 
 
 @app.command()
+def plot(
+    run: ResultFile,
+    case: CaseName = None,
+    facet: Facet = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Folder for the figures; beside the result unless given."
+        ),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Draw a result as PNG files: an overview and the maps of every case, or the flight to a facet.
+
+    The paths of the figures go to stdout as they are written. With --facet: the histories and the path
+    of the stored flight to that facet, flown again.
+    """
+    found = _read(run)
+    folder = run.parent if out is None else out
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        fix = "choose another folder with --out"
+        raise OutputRefused(f"cannot be made: {error.strerror}", where=str(folder), fix=fix) from error
+    stem = folder / run.stem
+    written = []
+    for path in _module(found, "figures").write_figures(_run_of(found), stem, case, facet):
+        written.append(str(path))
+        if not as_json:
+            console.print_text(str(path))
+    if as_json:
+        console.print_json(written)
+
+
+@app.command()
 def diff(
     before: Annotated[Path, typer.Argument(metavar="A.h5", help="The earlier result.")],
     after: Annotated[Path, typer.Argument(metavar="B.h5", help="The later result.")],
