@@ -131,13 +131,13 @@ class Journal:
 
     def close(self) -> None:
         """Release the lock; a journal without any record is deleted."""
-        if self._descriptor < 0:
+        descriptor, self._descriptor = self._descriptor, -1  # an interrupt must not let it be closed twice
+        if descriptor < 0:
             return
         if not self._count:
             with suppress(OSError):
                 self.path.unlink()
-        os.close(self._descriptor)
-        self._descriptor = -1
+        os.close(descriptor)
 
     def __enter__(self) -> Self:
         return self

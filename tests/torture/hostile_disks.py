@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import resource
+import signal
 import subprocess
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -109,12 +111,13 @@ def _second_run(reference: Reference, folder: Path) -> Tally:
     output = folder / "twice" / "run.h5"
     command = reference.program.command(output)
     first = subprocess.Popen(command, env=environment(), stdout=subprocess.DEVNULL)
-    while not output.with_name("run.h5.journal").exists():
-        first.poll()
+    while first.poll() is None and not output.with_name("run.h5.journal").exists():
+        time.sleep(0.01)
+    first.send_signal(signal.SIGSTOP)  # it must still be at work, however fast it is
     for choice in ([], ["--resume"], ["--force"]):
         ended = finish([*command, *choice])
-        complaints = refused(ended) if first.poll() is None else ["the first ended too early"]
-        tally.record(f"second with {choice}", complaints)
+        tally.record(f"second with {choice}", refused(ended))
+    first.send_signal(signal.SIGCONT)
     complaints = [] if first.wait() == 0 else [f"the first ended with {first.returncode}"]
     tally.record("the first is not disturbed", complaints or reference.resumed(output))
     return tally

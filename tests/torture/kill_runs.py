@@ -75,11 +75,13 @@ def _answer(
 ) -> list[str]:
     """A run that is asked to stop says so in one line, with its code, in time."""
     lines = told.strip().splitlines()
-    complaints = ["a traceback"] if "Traceback" in told and after > START_UP_S else []
+    state = "stored" if output.exists() else "recording" if journal_path(output).exists() else "not begun"
+    ending = f" ({state}): {told.strip()[-300:]!r}"
+    complaints = [f"a traceback{ending}"] if "Traceback" in told and after > START_UP_S else []
     if code == 0 or caught not in ANSWERED:
         return complaints
     if code != ANSWERED[caught] and after > START_UP_S:
-        complaints.append(f"exit code {code}: {told.strip()[-200:]}")
+        complaints.append(f"exit code {code}{ending}")
     if seconds > ANSWER_S:
         complaints.append(f"took {seconds:.1f} s to end")
     if journal_path(output).exists() and not (lines and "--resume" in lines[-1]):

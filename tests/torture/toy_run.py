@@ -62,11 +62,11 @@ def run(arguments: Sequence[str]) -> int:
     identity = RunIdentity(
         "toy run", f"name: toy\nfacets: {FACETS}\n", "0" * 64, "1", chunk_facets=CHUNK_FACETS
     )
+    guard.hint_on_interrupt("continue with --resume")
     journal = open_output(choices.output, identity, resume=choices.resume, force=choices.force)
     if journal is None:
         guard.tell(f"{choices.output} is up to date")
         return 0
-    guard.hint_on_interrupt("continue with --resume")
     plan = WorkPlan(choices.jobs, choices.backend, choices.scheduler)
     chunks = [np.arange(i, i + CHUNK_FACETS) for i in range(0, FACETS, CHUNK_FACETS)]
     with journal:
@@ -76,7 +76,6 @@ def run(arguments: Sequence[str]) -> int:
             solutions, lost = solve_recorded(journal, name, chunks, work, plan)
             cases.append(CaseResult(case, "pole", solutions, {"facets": FACETS}, lost=lost))
         result = ReachRun(tuple(cases))
-        guard.hint_on_interrupt("run again with --resume")
         finish_output(journal, run_to_tree(result), {}, watch.provenance(), complete=not result.lost_facets)
     print(f"wrote {choices.output}")
     if result.lost_facets:
