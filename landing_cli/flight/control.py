@@ -19,7 +19,7 @@ from landing_cli.flight.extremal import (
     extremal_scale,
     scaled_start,
     scaled_thrust,
-    switching,
+    thrust_ratio,
 )
 from landing_cli.flight.gauss import GAUSS_C, STAGES, sample_extremal
 from landing_cli.flight.legs import CostateLeg, FinalArcLeg, Leg, ThrustNodesLeg
@@ -149,7 +149,7 @@ def _scaled(leg: CostateLeg, w: float, ve: float) -> tuple[ExtremalScale, FloatA
 def _costate_pieces(leg: CostateLeg, w: float, ve: float) -> list[ThrustPiece]:
     """Integrate state and costates by DOP853 from kink to kink; the dense output gives the thrust."""
     scale, y = _scaled(leg, w, ve)
-    saturated = switching(scale, y) > 1.0
+    saturated = thrust_ratio(scale.flow, False, y)[0] > 1.0
     pieces: list[ThrustPiece] = []
     t = 0.0
     while t < 1.0:
@@ -183,7 +183,7 @@ def _kink(scale: ExtremalScale, saturated: bool) -> Callable[[float, FloatArray]
     """Event: the thrust reaches its bound, or leaves it."""
 
     def event(_t: float, y: FloatArray) -> float:
-        return switching(scale, y) - 1.0
+        return thrust_ratio(scale.flow, False, y)[0] - 1.0
 
     event.terminal = True  # type: ignore[attr-defined]
     event.direction = -1.0 if saturated else 1.0  # type: ignore[attr-defined]

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from landing_cli.body.gravity.kernel_types import VectorAndSymmetric
 from landing_cli.body.gravity.kernels import acceleration_and_gradient
 
 FloatArray = NDArray[np.float64]
@@ -104,39 +105,35 @@ def scaled_start(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def switching(scale: ExtremalScale, y: FloatArray) -> float:
-    """Return rho, the thrust ratio that the costates ask for (Zhao 2022, eq 11)."""
-    return math.sqrt(y[10] * y[10] + y[11] * y[11] + y[12] * y[12]) / y[6] + scale.flow * y[13]
+def thrust_ratio(flow: float, saturated: bool, y: FloatArray) -> tuple[float, float]:
+    """Return u and the norm of lambda_v; unsaturated, u is the switching function (Zhao 2022, eqs 10-11)."""
+    norm = max(math.sqrt(y[10] * y[10] + y[11] * y[11] + y[12] * y[12]), 1e-12)
+    return 1.0 if saturated else norm / y[6] + flow * y[13], norm
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def extremal_rates(
-    kind: int, params: FloatArray, scale: ExtremalScale, saturated: bool, y: FloatArray, out: FloatArray
+def rates_in_gravity(
+    scale: ExtremalScale, saturated: bool, y: FloatArray, g: VectorAndSymmetric, out: FloatArray
 ) -> None:
     """Write the scaled time derivative of state and costates.
 
     Parameters
     ----------
-    kind : int
-        Gravity model.
-    params : (p,) float, SI
-        Parameters of the gravity model.
     scale : ExtremalScale
         Constants of the scaled equations.
     saturated : bool
         Whether the thrust is at its bound; fixed within a step, so that a step stays smooth.
     y : (14,) float, scaled
         Position, velocity, mass and their costates.
+    g : tuple of 9 float, m/s2 and 1/s2
+        Gravity and its gradient at the position.
     out : (14,) float, scaled
         Receives the rates.
     """
-    length, w = scale.length_m, scale.spin
-    g = acceleration_and_gradient(kind, params, y[0] * length, y[1] * length, y[2] * length)
-    grow = scale.time_s * scale.time_s
-    lx, ly, lz = y[10], y[11], y[12]
-    norm = math.sqrt(lx * lx + ly * ly + lz * lz)
-    u = 1.0 if saturated else norm / y[6] + scale.flow * y[13]
-    a = -u / (y[6] * norm) if norm > 0.0 else 0.0
+    w, grow = scale.spin, scale.time_s * scale.time_s
+    lx, ly, lz, m = y[10], y[11], y[12], y[6]
+    u, norm = thrust_ratio(scale.flow, saturated, y)
+    a = -u / (m * norm)
     out[0], out[1], out[2] = y[3], y[4], y[5]
     out[3] = g[0] / scale.acceleration_m_s2 + w * (2.0 * y[4] + w * y[0]) + a * lx
     out[4] = g[1] / scale.acceleration_m_s2 + w * (-2.0 * y[3] + w * y[1]) + a * ly
@@ -148,13 +145,22 @@ def extremal_rates(
     out[10] = -y[7] + 2.0 * w * ly
     out[11] = -y[8] - 2.0 * w * lx
     out[12] = -y[9]
-    out[13] = -u * norm / (y[6] * y[6])
+    out[13] = -u * norm / (m * m)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def extremal_rates(
+    kind: int, params: FloatArray, scale: ExtremalScale, saturated: bool, y: FloatArray, out: FloatArray
+) -> None:
+    """Write the rates of ``rates_in_gravity`` in a gravity field (kind, params)."""
+    length = scale.length_m
+    g = acceleration_and_gradient(kind, params, y[0] * length, y[1] * length, y[2] * length)
+    rates_in_gravity(scale, saturated, y, g, out)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def scaled_thrust(scale: ExtremalScale, saturated: bool, y: FloatArray, out: FloatArray) -> None:
     """Write the thrust vector over its bound (Zhao 2022, eqs 9-10)."""
-    norm = math.sqrt(y[10] * y[10] + y[11] * y[11] + y[12] * y[12])
-    u = 1.0 if saturated else switching(scale, y)
+    u, norm = thrust_ratio(scale.flow, saturated, y)
     for a in range(3):
-        out[a] = -u * y[10 + a] / norm if norm > 0.0 else 0.0
+        out[a] = -u * y[10 + a] / norm

@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.flight.dynamics import natural_acceleration
-from landing_cli.flight.extremal import ExtremalScale, extremal_rates, scaled_thrust, switching
+from landing_cli.flight.extremal import ExtremalScale, extremal_rates, scaled_thrust, thrust_ratio
 
 FloatArray = NDArray[np.float64]
 
@@ -175,9 +175,9 @@ def _extremal_step(
 def _first_crossing(scale: ExtremalScale, saturated: bool, stages: FloatArray, out: FloatArray) -> float:
     """Return the fraction of the step by which the switching function has crossed 1; 2 if it has not."""
     for i in range(STAGES):
-        if (switching(scale, stages[i]) > 1.0) != saturated:
+        if (thrust_ratio(scale.flow, False, stages[i])[0] > 1.0) != saturated:
             return float(GAUSS_C[i])
-    if (switching(scale, out) > 1.0) != saturated:
+    if (thrust_ratio(scale.flow, False, out)[0] > 1.0) != saturated:
         return 1.0
     return 2.0
 
@@ -220,7 +220,7 @@ def sample_extremal(
         Number of steps taken.
     """
     stages, out = np.zeros((STAGES, y.shape[0])), np.zeros(y.shape[0])
-    saturated = switching(scale, y) > 1.0
+    saturated = thrust_ratio(scale.flow, False, y)[0] > 1.0
     t, k, h = 0.0, 0, 1.0 / n_steps
     scaled_thrust(scale, saturated, y, knots[0])
     for n in range(1, n_steps + 1):
@@ -257,10 +257,10 @@ def _to_the_kink(
 ) -> float:
     """Step to where the switching function reaches 1, within (0, upper], and return the step."""
     lo, hi, step = 0.0, upper, upper
-    f_lo = switching(scale, y) - 1.0
+    f_lo = thrust_ratio(scale.flow, False, y)[0] - 1.0
     f_lo = max(f_lo, 1e-15) if saturated else min(f_lo, -1e-15)  # a step may begin on a kink
     _extremal_step(kind, params, scale, saturated, hi, y, stages, out)
-    f_hi = switching(scale, out) - 1.0
+    f_hi = thrust_ratio(scale.flow, False, out)[0] - 1.0
     f = f_hi
     for _ in range(60):
         if abs(f) < 1e-14 or hi - lo < 1e-15 or (f_lo > 0.0) == (f_hi > 0.0):
@@ -269,7 +269,7 @@ def _to_the_kink(
         if not lo < step < hi:
             step = 0.5 * (lo + hi)
         _extremal_step(kind, params, scale, saturated, step, y, stages, out)
-        f_before, f = f, switching(scale, out) - 1.0
+        f_before, f = f, thrust_ratio(scale.flow, False, out)[0] - 1.0
         sticks = (f > 0.0) == (f_before > 0.0)
         if (f > 0.0) == (f_hi > 0.0):
             hi, f_hi = step, f

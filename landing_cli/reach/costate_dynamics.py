@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.body.gravity.kernels import acceleration_and_gradient, curvature
-from landing_cli.flight.extremal import ExtremalScale
+from landing_cli.flight.extremal import ExtremalScale, rates_in_gravity, thrust_ratio
 
 Floats = NDArray[np.float64]
 
@@ -73,33 +73,12 @@ def gravity_point(field: Field, y: Floats) -> tuple[float, float, float]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def thrust_ratio(flow: float, saturated: bool, y: Floats) -> tuple[float, float]:
-    """Return u and |lambda_v| (Zhao 2022, eqs 10-11)."""
-    norm = max(math.sqrt(y[10] * y[10] + y[11] * y[11] + y[12] * y[12]), 1e-12)
-    return 1.0 if saturated else norm / y[6] + flow * y[13], norm
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def _rates(field: Field, saturated: bool, y: Floats, out: Floats) -> None:
-    scale = field.scale
-    w, grow = scale.spin, scale.time_s * scale.time_s
+    """Rates of state, costates and energy."""
     x, yy, z = gravity_point(field, y)
     g = acceleration_and_gradient(field.kind, field.params, x, yy, z)
-    lx, ly, lz = y[10], y[11], y[12]
-    u, norm = thrust_ratio(scale.flow, saturated, y)
-    a = -u / (y[6] * norm)
-    out[0], out[1], out[2] = y[3], y[4], y[5]
-    out[3] = g[0] / scale.acceleration_m_s2 + w * (2.0 * y[4] + w * y[0]) + a * lx
-    out[4] = g[1] / scale.acceleration_m_s2 + w * (-2.0 * y[3] + w * y[1]) + a * ly
-    out[5] = g[2] / scale.acceleration_m_s2 + a * lz
-    out[6] = -scale.flow * u
-    out[7] = -w * w * lx - grow * (g[3] * lx + g[6] * ly + g[7] * lz)
-    out[8] = -w * w * ly - grow * (g[6] * lx + g[4] * ly + g[8] * lz)
-    out[9] = -grow * (g[7] * lx + g[8] * ly + g[5] * lz)
-    out[10] = -y[7] + 2.0 * w * ly
-    out[11] = -y[8] - 2.0 * w * lx
-    out[12] = -y[9]
-    out[13] = -u * norm / (y[6] * y[6])
+    rates_in_gravity(field.scale, saturated, y, g, out)
+    u, _ = thrust_ratio(field.scale.flow, saturated, y)
     out[14] = 0.5 * u * u
 
 
@@ -222,43 +201,19 @@ def _tangent_rates(field: Field, saturated: bool, y: Floats, X: Floats, rate: Fl
     """Rates of state and energy (as ``_rates``) and of all tangent columns, (15, 8) each."""
     scale = field.scale
     flow, w, grow = scale.flow, scale.spin, scale.time_s * scale.time_s
-    w2 = w * w
     x, yy, z = gravity_point(field, y)
     g = acceleration_and_gradient(field.kind, field.params, x, yy, z)
+    rates_in_gravity(scale, saturated, y, g, rate)
     lx, ly, lz, m = y[10], y[11], y[12], y[6]
-    q = curvature(field.kind, field.params, x, yy, z, lx, ly, lz)
-    gxx, gyy, gzz, gxy, gxz, gyz = (
-        grow * g[3] + w2,
-        grow * g[4] + w2,
-        grow * g[5],
-        grow * g[6],
-        grow * g[7],
-        grow * g[8],
-    )
-    bend = grow * scale.length_m
-    qxx, qyy, qzz, qxy, qxz, qyz = (
-        bend * q[0],
-        bend * q[1],
-        bend * q[2],
-        bend * q[3],
-        bend * q[4],
-        bend * q[5],
-    )
     u, norm = thrust_ratio(flow, saturated, y)
-    a = -u / (m * norm)
-    rate[0], rate[1], rate[2] = y[3], y[4], y[5]
-    rate[3] = g[0] / scale.acceleration_m_s2 + w * (2.0 * y[4] + w * y[0]) + a * lx
-    rate[4] = g[1] / scale.acceleration_m_s2 + w * (-2.0 * y[3] + w * y[1]) + a * ly
-    rate[5] = g[2] / scale.acceleration_m_s2 + a * lz
-    rate[6] = -flow * u
-    rate[7] = -gxx * lx - gxy * ly - gxz * lz
-    rate[8] = -gxy * lx - gyy * ly - gyz * lz
-    rate[9] = -gxz * lx - gyz * ly - gzz * lz
-    rate[10] = -y[7] + 2.0 * w * ly
-    rate[11] = -y[8] - 2.0 * w * lx
-    rate[12] = -y[9]
-    rate[13] = -u * norm / (m * m)
     rate[14] = 0.5 * u * u
+    a = -u / (m * norm)
+    q = curvature(field.kind, field.params, x, yy, z, lx, ly, lz)
+    gxx, gyy, gzz = grow * g[3] + w * w, grow * g[4] + w * w, grow * g[5]
+    gxy, gxz, gyz = grow * g[6], grow * g[7], grow * g[8]
+    bend = grow * scale.length_m
+    qxx, qyy, qzz = bend * q[0], bend * q[1], bend * q[2]
+    qxy, qxz, qyz = bend * q[3], bend * q[4], bend * q[5]
     free = 0.0 if saturated else 1.0
     ux, uy, uz = lx / norm, ly / norm, lz / norm
     u_norm, u_m, u_l = free / m, -free * norm / (m * m), free * flow

@@ -10,16 +10,15 @@ from numpy.typing import NDArray
 
 from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import path_clearance
-from landing_cli.reach.costate_dynamics import MAX_SPLITS, fly_extremal, thrust_ratio
+from landing_cli.flight.extremal import thrust_ratio
+from landing_cli.reach.costate_dynamics import MAX_SPLITS, fly_extremal
 from landing_cli.reach.delivery import LIMIT_TOLERANCE, Deliveries, Frame
-from landing_cli.reach.extremal_facet import Flight, new_flight, start_extremal
-from landing_cli.reach.extremal_terms import ExtremalProblem, find_dips
+from landing_cli.reach.ellipsoid_dips import find_dips
+from landing_cli.reach.extremal_facet import FINE_STEPS, Flight, new_flight, start_extremal
+from landing_cli.reach.extremal_terms import ExtremalProblem
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
 
 Floats = NDArray[np.float64]
-
-# The search flies 30 steps; at 120 the handover is within a millimetre of the truth, and the path is smooth.
-FINE_STEPS = 120
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -17,12 +17,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from landing_cli.reach.costate_dynamics import thrust_ratio
+from landing_cli.flight.extremal import thrust_ratio
 from landing_cli.reach.delivery import VALUE_COLUMNS, new_deliveries
 from landing_cli.reach.extremal_delivery import deliver_extremals
 from landing_cli.reach.extremal_facet import (
+    COARSE_STEPS,
     FEASIBLE,
-    N_STEPS,
+    FINE_STEPS,
     OPTIMAL,
     STUCK,
     UNCONVERGED,
@@ -137,7 +138,13 @@ def _pressures(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def search_batch(
-    problem: ExtremalProblem, targets: Floats, normals: Floats, starts: Floats, found: Found
+    problem: ExtremalProblem,
+    targets: Floats,
+    normals: Floats,
+    starts: Floats,
+    n_steps: int,
+    guards: Floats,
+    found: Found,
 ) -> None:
     """Search for the best extremal of each facet.
 
@@ -151,14 +158,19 @@ def search_batch(
         Outward unit normals.
     starts : (n, k, 7) float, scaled
         Costates to start from, tried in turn until one leads to an optimum; NaN rows are passed over.
+    n_steps : int
+        Steps of an extremal.
+    guards : (n,) float
+        Kept from the thrust bound of the final arc, for what the thrust bulges between the points.
     found : Found
         Filled.
     """
-    here, there, spare = new_flight(N_STEPS), new_flight(N_STEPS), new_flight(N_STEPS)
-    search = new_search(problem)
+    here, there, spare = new_flight(n_steps), new_flight(n_steps), new_flight(n_steps)
+    search = new_search(problem, n_steps)
     costates = np.zeros(7)
     for i in range(targets.shape[0]):
         found.status[i], found.broken[i], found.energy[i] = UNCONVERGED, math.inf, math.inf
+        search.guard[0] = guards[i]
         for s in range(starts.shape[1]):
             if not math.isfinite(starts[i, s].sum()):
                 continue
@@ -177,12 +189,15 @@ def search_batch(
                 break
 
 
-def _search(prepared: PreparedCase, problem: ExtremalProblem, facets: Ints, starts: Floats | None) -> Found:
+def _search(
+    prepared: PreparedCase,
+    problem: ExtremalProblem,
+    facets: Ints,
+    starts: Floats,
+    n_steps: int,
+    guards: Floats,
+) -> Found:
     n = len(facets)
-    targets_m, normals = prepared.shared.centroids_m[facets], prepared.shared.normals[facets]
-    every = approximate_costates(prepared.case, targets_m)[:, None, :]
-    if starts is not None:
-        every = np.concatenate([np.asarray(starts, dtype=np.float64).reshape(n, -1, 7), every], axis=1)
     found = Found(
         np.zeros(n, dtype=np.int64),
         np.zeros(n, dtype=np.int64),
@@ -191,9 +206,19 @@ def _search(prepared: PreparedCase, problem: ExtremalProblem, facets: Ints, star
         np.zeros((n, 7)),
         np.zeros((n, len(Binding) - 1)),
     )
-    targets = targets_m / problem.field.scale.length_m
-    search_batch(problem, targets, normals, np.ascontiguousarray(every), found)
+    targets = prepared.shared.centroids_m[facets] / problem.field.scale.length_m
+    starts = np.ascontiguousarray(starts, dtype=np.float64).reshape(n, -1, 7)
+    search_batch(problem, targets, prepared.shared.normals[facets], starts, n_steps, guards, found)
     return found
+
+
+def _record(rows: NDArray[np.void], places: Ints, found: Found) -> None:
+    """Fill what a search says by itself."""
+    rows["iterations"][places] += found.rounds
+    rows["violation"][places] = found.broken
+    slight = found.pressure.max(axis=1) <= SLIGHT_PRESSURE * found.energy
+    rows["binding"][places] = np.where(slight, int(Binding.NONE), np.argmax(found.pressure, axis=1) + 1)
+    rows["verdict"][places] = np.where(found.status == STUCK, Verdict.UNREACHABLE, Verdict.UNRESOLVED)
 
 
 def _deliver(
@@ -202,34 +227,31 @@ def _deliver(
     rows: NDArray[np.void],
     places: Ints,
     costates: Floats,
-) -> None:
-    """Fly the feasible extremals at fine steps and fill their rows; reachable is what meets every limit."""
-    facets = rows["facet"][places]
+) -> Floats:
+    """Fly feasible extremals at fine steps and fill the rows of those that meet every limit.
+
+    Returns the violation of each, (n,).
+    """
+    facets, shared = rows["facet"][places], prepared.shared
+    targets_m, normals = shared.centroids_m[facets], shared.normals[facets]
     out = new_deliveries(len(places))
-    deliver_extremals(
-        problem,
-        prepared.frame,
-        prepared.shared.surface,
-        costates,
-        prepared.shared.centroids_m[facets],
-        prepared.shared.normals[facets],
-        out,
-    )
-    met = out.values[:, VALUE_COLUMNS.index("violation")] == 0.0
-    if prepared.case.terrain == "require":
-        depth = -out.values[:, VALUE_COLUMNS.index("terrain_clearance_min_m")]
-        cuts = places[met & (depth > 0.0)]
-        rows["verdict"][cuts], rows["binding"][cuts] = Verdict.UNREACHABLE, Binding.TERRAIN
-        rows["violation"][cuts] = depth[met & (depth > 0.0)] / problem.field.scale.length_m
-        met &= depth <= 0.0
-    places = places[met]
-    rows["verdict"][places] = Verdict.REACHABLE
+    deliver_extremals(problem, prepared.frame, shared.surface, costates, targets_m, normals, out)
+    excess = out.values[:, VALUE_COLUMNS.index("violation")]
+    met = excess == 0.0
+    depth = -out.values[:, VALUE_COLUMNS.index("terrain_clearance_min_m")]
+    cuts = met & (depth > 0.0) & (prepared.case.terrain == "require")
+    rows["verdict"][places[cuts]], rows["binding"][places[cuts]] = Verdict.UNREACHABLE, Binding.TERRAIN
+    rows["violation"][places[cuts]] = depth[cuts] / problem.field.scale.length_m
+    flown = met & ~cuts
+    chosen = places[flown]
+    rows["verdict"][chosen] = Verdict.REACHABLE
     for column, name in enumerate(VALUE_COLUMNS):
-        rows[name][places] = out.values[met, column]
-    rows["handover_position_m"][places] = out.handover[met, :3]
-    rows["handover_velocity_m_s"][places] = out.handover[met, 3:6]
-    rows["handover_mass_kg"][places] = out.handover[met, 6]
-    rows["costates"][places] = costates[met]
+        rows[name][chosen] = out.values[flown, column]
+    rows["handover_position_m"][chosen] = out.handover[flown, :3]
+    rows["handover_velocity_m_s"][chosen] = out.handover[flown, 3:6]
+    rows["handover_mass_kg"][chosen] = out.handover[flown, 6]
+    rows["costates"][chosen] = costates[flown]
+    return excess
 
 
 def solve_prepared(
@@ -255,14 +277,21 @@ def solve_prepared(
     indices = np.asarray(facets, dtype=np.int64)
     rows = blank_rows(indices)
     problem = extremal_problem(prepared.case)
-    found = _search(prepared, problem, indices, starts)
-    rows["iterations"] = found.rounds
-    rows["violation"] = found.broken
-    slight = found.pressure.max(axis=1) <= SLIGHT_PRESSURE * found.energy
-    rows["binding"] = np.where(slight, int(Binding.NONE), np.argmax(found.pressure, axis=1) + 1)
-    rows["verdict"][found.status == STUCK] = Verdict.UNREACHABLE
+    every = approximate_costates(prepared.case, prepared.shared.centroids_m[indices])[:, None, :]
+    if starts is not None:
+        given = np.asarray(starts, dtype=np.float64).reshape(len(rows), -1, 7)
+        every = np.concatenate([given, every], axis=1)
+    found = _search(prepared, problem, indices, every, COARSE_STEPS, np.zeros(len(rows)))
+    _record(rows, np.arange(len(rows)), found)
     feasible = np.flatnonzero(found.broken < FEASIBLE)
-    _deliver(prepared, problem, rows, feasible, found.costates[feasible])
+    excess = _deliver(prepared, problem, rows, feasible, found.costates[feasible])
+    off, excess = feasible[excess > 0.0], excess[excess > 0.0]
+    if len(off):
+        # too coarse in the steps, or between the points of the final arc: go on from there, finely
+        finer = _search(prepared, problem, indices[off], found.costates[off], FINE_STEPS, excess)
+        _record(rows, off, finer)
+        met = finer.broken < FEASIBLE
+        _deliver(prepared, problem, rows, off[met], finer.costates[met])
     return FacetSolutions(rows, np.zeros((0, 3)))
 
 

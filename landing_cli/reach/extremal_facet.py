@@ -33,25 +33,23 @@ from landing_cli.reach.costate_dynamics import (
     new_extremal,
     tangents,
 )
+from landing_cli.reach.ellipsoid_dips import Dips, dip_row, find_dips, new_dips
 from landing_cli.reach.extremal_terms import (
     MAX_ROWS,
     ROW_DIPS,
     ROW_HANDOVER,
     ROW_MASS,
-    Dips,
     ExtremalProblem,
-    dip_row,
     final_energy,
-    find_dips,
     handover_hessian,
     handover_rows,
-    new_dips,
 )
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-N_STEPS = 30
+# Steps of a search, and of the flight that is delivered, whose handover is within a millimetre of the truth.
+COARSE_STEPS, FINE_STEPS = 30, 120
 N = 7
 UNCONVERGED, OPTIMAL, STUCK = 0, 1, 2
 
@@ -98,6 +96,7 @@ class Search(NamedTuple):
     spare_rows: Floats  # (2, MAX_ROWS)
     end_jacobian: Floats  # (ROW_MASS, 7)
     end_gradient: Floats  # (7,)
+    guard: Floats  # (1,) kept from the thrust bound of the final arc
 
 
 class Ended(NamedTuple):
@@ -116,8 +115,8 @@ def new_flight(n_steps: int) -> Flight:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def new_search(problem: ExtremalProblem) -> Search:
-    """Work space for the facets of one case."""
+def new_search(problem: ExtremalProblem, n_steps: int) -> Search:
+    """Work space for the facets of one case, flown with ``n_steps`` steps."""
     model = new_local_model(N, MAX_ROWS)
     for r in range(MAX_ROWS):
         model.equality[r] = r == ROW_MASS or (r == ROW_HANDOVER and problem.on_ellipsoid)
@@ -129,7 +128,7 @@ def new_search(problem: ExtremalProblem) -> Search:
         np.zeros((N, N)),
         np.zeros(N),
         np.zeros((MAX_ROWS, N)),
-        np.zeros((N_STEPS + MAX_SPLITS + 1, 6, COLUMNS)),
+        np.zeros((n_steps + MAX_SPLITS + 1, 6, COLUMNS)),
         np.zeros(N),
         np.zeros(N),
         np.zeros(N),
@@ -137,6 +136,7 @@ def new_search(problem: ExtremalProblem) -> Search:
         np.zeros((2, MAX_ROWS)),
         np.zeros((ROW_MASS, N)),
         np.zeros(N),
+        np.zeros(1),
     )
 
 
@@ -157,9 +157,10 @@ def _try(
 ) -> Trial:
     """Fly the extremal of the given costates and evaluate cost and rows."""
     start_extremal(problem, costates, flight.extremal)
-    k = fly_extremal(problem.field, N_STEPS, flight.extremal)
+    n_steps = flight.extremal.step.shape[0] - MAX_SPLITS
+    k = fly_extremal(problem.field, n_steps, flight.extremal)
     x = flight.extremal.state[k]
-    handover_rows(problem, target, normal, x, flight.values, search.end_jacobian)
+    handover_rows(problem, target, normal, x, search.guard[0], flight.values, search.end_jacobian)
     flight.values[ROW_MASS] = x[13]
     rows = ROW_DIPS + find_dips(problem.field.inverse_axes, flight.extremal, k, flight.dips)
     for d in range(rows - ROW_DIPS):
@@ -184,7 +185,7 @@ def _differentiate(
     X, K = np.zeros((STATE, COLUMNS)), np.zeros((N, N))
     tangents(problem.field, flight.extremal, trial.steps, X, search.node_tangents)
     x = flight.extremal.state[trial.steps]
-    handover_rows(problem, target, normal, x, model.values, search.end_jacobian)
+    handover_rows(problem, target, normal, x, search.guard[0], model.values, search.end_jacobian)
     final_energy(problem, target, x, search.end_gradient)
     handover_hessian(problem, target, x, multipliers, K)
     for j in range(N):
@@ -207,7 +208,7 @@ def _differentiate(
         model.values[r] = flight.values[r]
     for r in range(ROW_DIPS, trial.rows):
         dip_row(
-            problem,
+            problem.field.inverse_axes,
             flight.extremal,
             search.node_tangents,
             flight.dips,
@@ -332,7 +333,7 @@ def search_extremal(
     costates : (7,) float, scaled
         The start; holds the best costates on return.
     here, there, spare : Flight
-        Scratch space.
+        Scratch space; its size sets the number of steps.
     search : Search
         Scratch space; its multipliers belong to the returned costates.
 

@@ -6,7 +6,7 @@ distance from the ellipsoid at every dip of the path towards it (eq 5).
 
 Rows, each >= 0 or = 0, in scaled units:
 
-    thrust      (1 - (m T)^2) / 2 at points of the final arc
+    thrust      (1 - (m T)^2) / 2 at points of the final arc, from touchdown to handover
     glide       n.w - cos(theta) |w| for w = 2 a_e + a_s (handover) and w = a_e (touchdown): r - r_c is s^2
                 times a mix of the two, and the cone is convex, so that both ends inside mean the whole arc
     handover    |xi(r_p)| - 1
@@ -26,26 +26,22 @@ from numpy.typing import NDArray
 
 from landing_cli.body.gravity.kernels import acceleration_and_gradient
 from landing_cli.flight.extremal import extremal_scale
-from landing_cli.reach.costate_dynamics import COLUMNS, Extremal, Field, gravity_point
+from landing_cli.reach.costate_dynamics import Field, gravity_point
+from landing_cli.reach.ellipsoid_dips import MAX_DIPS, add_level_bend, level_and_gradient
 from landing_cli.reach.records import LandingCase
 
 Floats = NDArray[np.float64]
 
-# Fractions of the final stage's time-to-go at which its thrust bound is imposed. a* is linear in time, so
-# two ends would do for it alone; gravity along the arc bends the real thrust between them.
-ARC_FRACTIONS = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
-N_ARC = len(ARC_FRACTIONS)
-# Kept from the thrust bound at those points: between them the thrust bulges, and the search's steps are coarse.
-BULGE = 3e-5
+# Intervals of the final arc, at whose ends its thrust bound is imposed. a* is linear in time, so two ends
+# would do for it alone; gravity along the arc bends the real thrust between them.
+ARC_INTERVALS = 8
+N_ARC = ARC_INTERVALS + 1
 ROW_GLIDE = N_ARC
 ROW_HANDOVER = N_ARC + 2
 ROW_PROPELLANT = N_ARC + 3
 ROW_MASS = N_ARC + 4
 ROW_DIPS = N_ARC + 5
-MAX_DIPS = 4
 MAX_ROWS = ROW_DIPS + MAX_DIPS
-# Dips that stay above this level of |xi| do not become rows.
-FAR = 1.2
 
 
 class ExtremalProblem(NamedTuple):
@@ -57,7 +53,6 @@ class ExtremalProblem(NamedTuple):
     final_time: float
     propellant: float  # bound on the mass used; more than 1 when unbounded
     cos_half_angle: float
-    arc_fractions: Floats  # (A,)
     compensated: bool
     on_ellipsoid: bool
 
@@ -88,7 +83,6 @@ def extremal_problem(case: LandingCase) -> ExtremalProblem:
         final_time=case.final_stage_s / case.descent_s,
         propellant=2.0 if bound is None else bound / craft.mass_kg,
         cos_half_angle=math.cos(case.glide_slope_half_angle_rad),
-        arc_fractions=np.array(ARC_FRACTIONS),
         compensated=case.final_stage_thrust == "compensated",
         on_ellipsoid=case.handover == "on_ellipsoid",
     )
@@ -109,21 +103,25 @@ def _arc_weights(sigma: float, T: float) -> tuple[float, float, float, float, fl
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _arc_thrust(
-    problem: ExtremalProblem, target: Floats, x: Floats, sigma: float, thrust: Floats, D: Floats
+def _arc_acceleration(
+    problem: ExtremalProblem, target: Floats, x: Floats, sigma: float, star: Floats, D: Floats
 ) -> None:
-    """Thrust per mass on the final arc (3,), and its derivative (3, 6) with respect to (r_p, v_p).
-
-    Real thrust: a* less gravity, Coriolis and centrifugal acceleration; a* alone in the paper's reading.
-    """
-    ad, av, rd, rv, vd, vv = _arc_weights(sigma, problem.final_time)
+    """Total acceleration a* on the final arc (3,), and its derivative (3, 6) with respect to (r_p, v_p)."""
+    ad, av, _, _, _, _ = _arc_weights(sigma, problem.final_time)
     for i in range(3):
-        thrust[i] = ad * (x[i] - target[i]) + av * x[3 + i]
+        star[i] = ad * (x[i] - target[i]) + av * x[3 + i]
         for j in range(6):
             D[i, j] = 0.0
         D[i, i], D[i, 3 + i] = ad, av
-    if not problem.compensated:
-        return
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _arc_thrust(
+    problem: ExtremalProblem, target: Floats, x: Floats, sigma: float, thrust: Floats, D: Floats
+) -> None:
+    """Thrust per mass on the final arc and its derivative: a* less gravity and the frame's accelerations."""
+    _arc_acceleration(problem, target, x, sigma, thrust, D)
+    _, _, rd, rv, vd, vv = _arc_weights(sigma, problem.final_time)
     field, w = problem.field, problem.field.scale.spin
     r, v = np.zeros(3), np.zeros(3)
     for i in range(3):
@@ -149,15 +147,12 @@ def _arc_thrust(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def level_and_gradient(inverse_axes: Floats, r: Floats, normal: Floats) -> float:
-    """|xi| = sqrt(r' Re r), and its gradient into ``normal``."""
-    level2 = 0.0
-    for i in range(3):
-        level2 += (inverse_axes[i] * r[i]) ** 2
-    level = max(math.sqrt(level2), 1e-9)
-    for i in range(3):
-        normal[i] = inverse_axes[i] ** 2 * r[i] / level
-    return level
+def _norm_and_slope(vector: Floats, D: Floats, slope: Floats) -> float:
+    """Norm of a vector, and the norm's derivative (6,) from the vector's."""
+    norm = max(math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2), 1e-9)
+    for a in range(6):
+        slope[a] = (vector[0] * D[0, a] + vector[1] * D[1, a] + vector[2] * D[2, a]) / norm
+    return norm
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -175,47 +170,62 @@ def final_energy(problem: ExtremalProblem, target: Floats, x: Floats, gradient: 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _thrust_rows(
+    problem: ExtremalProblem, target: Floats, x: Floats, guard: float, values: Floats, jacobian: Floats
+) -> None:
+    """Thrust along the final arc, and the propellant left at touchdown.
+
+    The thrust that is bounded is the real one, or m a* alone in the paper's reading; the mass flows with the
+    real one.
+    """
+    n = ARC_INTERVALS
+    width = 0.5 * problem.field.scale.flow * problem.final_time / n
+    vector, D, d_norm, d_last, d_pull = np.zeros(3), np.zeros((3, 6)), np.zeros(7), np.zeros(7), np.zeros(7)
+    mass, last, d_mass = x[6], 0.0, np.zeros(7)
+    d_mass[6] = 1.0
+    for j in range(n, -1, -1):
+        _arc_thrust(problem, target, x, j / n, vector, D)
+        norm = _norm_and_slope(vector, D, d_norm)
+        if j < n:
+            decay = math.exp(-width * (norm + last))
+            mass *= decay
+            for a in range(7):
+                d_mass[a] = decay * d_mass[a] - width * mass * (d_norm[a] + d_last[a])
+        pull = norm
+        for a in range(7):
+            d_last[a], d_pull[a] = d_norm[a], d_norm[a]
+        if not problem.compensated:
+            _arc_acceleration(problem, target, x, j / n, vector, D)
+            pull = _norm_and_slope(vector, D, d_pull)
+        values[j] = 0.5 * (1.0 - (mass * pull) ** 2) - guard
+        for a in range(7):
+            jacobian[j, a] = -mass * pull * (d_mass[a] * pull + mass * d_pull[a])
+        last = norm
+    values[ROW_PROPELLANT] = problem.propellant - 1.0 + mass
+    for a in range(7):
+        jacobian[ROW_PROPELLANT, a] = d_mass[a]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def handover_rows(
     problem: ExtremalProblem,
     target: Floats,
     facet_normal: Floats,
     x: Floats,
+    guard: float,
     values: Floats,
     jacobian: Floats,
 ) -> None:
-    """Values and derivatives (.., 7) of the rows that the handover state decides."""
-    T, flow = problem.final_time, problem.field.scale.flow
-    thrust, D = np.zeros(3), np.zeros((3, 6))
-    log_mass, d_log, d_norm, last_norm = math.log(x[6]), np.zeros(7), np.zeros(7), 0.0
-    last_d_norm = np.zeros(7)
-    d_log[6] = 1.0 / x[6]
-    for j in range(N_ARC - 1, -1, -1):
-        sigma = problem.arc_fractions[j]
-        _arc_thrust(problem, target, x, sigma, thrust, D)
-        norm = max(math.sqrt(thrust[0] ** 2 + thrust[1] ** 2 + thrust[2] ** 2), 1e-9)
-        for a in range(6):
-            d_norm[a] = (thrust[0] * D[0, a] + thrust[1] * D[1, a] + thrust[2] * D[2, a]) / norm
-        if j < N_ARC - 1:
-            width = 0.5 * flow * T * (problem.arc_fractions[j + 1] - sigma)
-            log_mass -= width * (norm + last_norm)
-            for a in range(7):
-                d_log[a] -= width * (d_norm[a] + last_d_norm[a])
-        mass = math.exp(log_mass)
-        pull2 = (mass * norm) ** 2
-        values[j] = 0.5 * (1.0 - pull2) - BULGE
-        for a in range(7):
-            jacobian[j, a] = -pull2 * (d_norm[a] / norm + d_log[a])
-            last_d_norm[a] = d_norm[a]
-        last_norm = norm
-    values[ROW_PROPELLANT] = problem.propellant - 1.0 + math.exp(log_mass)
-    for a in range(7):
-        jacobian[ROW_PROPELLANT, a] = math.exp(log_mass) * d_log[a]
-    _glide_rows(problem, target, facet_normal, x, values, jacobian)
+    """Fill values and derivatives (.., 7) of the rows that the handover state decides.
+
+    ``guard`` is kept from the thrust bound, for what the thrust bulges between the points.
+    """
     normal = np.zeros(3)
+    _thrust_rows(problem, target, x, guard, values, jacobian)
+    _glide_rows(problem, target, facet_normal, x, values, jacobian)
     values[ROW_HANDOVER] = level_and_gradient(problem.field.inverse_axes, x, normal) - 1.0
-    jacobian[ROW_HANDOVER, :] = 0.0
-    for i in range(3):
-        jacobian[ROW_HANDOVER, i] = normal[i]
+    for a in range(7):
+        jacobian[ROW_HANDOVER, a] = normal[a] if a < 3 else 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -265,7 +275,11 @@ def handover_hessian(
     thrust, D = np.zeros(3), np.zeros((3, 6))
     for j in range(N_ARC):
         if multipliers[j] > 0.0:
-            _arc_thrust(problem, target, x, problem.arc_fractions[j], thrust, D)
+            sigma = j / ARC_INTERVALS
+            if problem.compensated:
+                _arc_thrust(problem, target, x, sigma, thrust, D)
+            else:
+                _arc_acceleration(problem, target, x, sigma, thrust, D)
             weight = multipliers[j] * x[6] * x[6]
             for a in range(6):
                 for b in range(6):
@@ -288,143 +302,3 @@ def handover_hessian(
     normal = np.zeros(3)
     level = level_and_gradient(problem.field.inverse_axes, x, normal)
     add_level_bend(problem.field.inverse_axes, level, normal, -multipliers[ROW_HANDOVER], K)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def add_level_bend(inverse_axes: Floats, level: float, normal: Floats, weight: float, K: Floats) -> None:
-    """Add ``weight`` times the Hessian of |xi| to the leading 3 x 3 block."""
-    for i in range(3):
-        K[i, i] += weight * inverse_axes[i] ** 2 / level
-        for j in range(3):
-            K[i, j] -= weight * normal[i] * normal[j] / level
-
-
-class Dips(NamedTuple):
-    """Local minima over time of the path's distance from the ellipsoid."""
-
-    step: NDArray[np.int64]  # (D,) the step it lies in
-    fraction: Floats  # (D,) where in the step
-    level: Floats  # (D,) |xi|
-    bend: Floats  # (D,) second derivative of |xi| over time
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def new_dips() -> Dips:
-    """Room for the dips of one path."""
-    return Dips(
-        np.zeros(MAX_DIPS, dtype=np.int64), np.zeros(MAX_DIPS), np.zeros(MAX_DIPS), np.zeros(MAX_DIPS)
-    )
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def hermite(f: float) -> tuple[float, float, float, float, float, float, float, float]:
-    """Cubic Hermite weights of (r0, h v0, r1, h v1) for the value and for h times the rate at f in [0, 1]."""
-    g = 1.0 - f
-    return (
-        g * g * (1.0 + 2.0 * f),
-        g * g * f,
-        f * f * (3.0 - 2.0 * f),
-        -f * f * g,
-        -6.0 * f * g,
-        g * (1.0 - 3.0 * f),
-        6.0 * f * g,
-        f * (3.0 * f - 2.0),
-    )
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def interpolate(h: float, f: float, before: Floats, after: Floats, r: Floats, v: Floats) -> None:
-    """Position and velocity within a step, from the states at its ends."""
-    a, b, c, d, ta, tb, tc, td = hermite(f)
-    for i in range(3):
-        r[i] = a * before[i] + b * h * before[3 + i] + c * after[i] + d * h * after[3 + i]
-        v[i] = (ta * before[i] + tc * after[i]) / h + tb * before[3 + i] + td * after[3 + i]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def find_dips(inverse_axes: Floats, extremal: Extremal, n: int, dips: Dips) -> int:
-    """Find where the path comes near the ellipsoid and leaves again; returns how many places.
-
-    The rate of |xi| changes sign from - to + within a step; the place is refined on the cubic Hermite
-    interpolant. The last node belongs to the handover's row.
-    """
-    count = 0
-    normal, r, v = np.zeros(3), np.zeros(3), np.zeros(3)
-    level_and_gradient(inverse_axes, extremal.state[0], normal)
-    before = _dot3(normal, extremal.state[0], 3)
-    for k in range(n):
-        level = level_and_gradient(inverse_axes, extremal.state[k + 1], normal)
-        after = _dot3(normal, extremal.state[k + 1], 3)
-        if before < 0.0 and after >= 0.0 and level < 1.5 * FAR and count < MAX_DIPS:
-            lo, hi, f_lo, f_hi = 0.0, 1.0, before, after
-            f = 0.0
-            for _ in range(30):
-                f = hi - f_hi * (hi - lo) / (f_hi - f_lo)
-                interpolate(extremal.step[k], f, extremal.state[k], extremal.state[k + 1], r, v)
-                level = level_and_gradient(inverse_axes, r, normal)
-                rate = _dot3(normal, v, 0)
-                if abs(rate) < 1e-13 or hi - lo < 1e-12:
-                    break
-                if rate > 0.0:
-                    hi, f_hi, f_lo = f, rate, 0.5 * f_lo
-                else:
-                    lo, f_lo, f_hi = f, rate, 0.5 * f_hi
-            if level < FAR:
-                dips.step[count], dips.fraction[count], dips.level[count] = k, f, level
-                dips.bend[count] = max((after - before) / extremal.step[k], 1e-9)
-                count += 1
-        before = after
-    return count
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _dot3(a: Floats, b: Floats, offset: int) -> float:
-    return a[0] * b[offset] + a[1] * b[offset + 1] + a[2] * b[offset + 2]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def dip_row(
-    problem: ExtremalProblem,
-    extremal: Extremal,
-    node_tangents: Floats,
-    dips: Dips,
-    place: int,
-    row: Floats,
-    weight: float,
-    hessian: Floats,
-) -> None:
-    """Derivative (7,) of |xi| at a dip with respect to the initial costates.
-
-    At a dip the time of it does not matter to first order. To second order it does: the Hessian without the
-    path's own second derivative, times ``weight``, is added to ``hessian`` (7, 7).
-    """
-    k, f, bend = dips.step[place], dips.fraction[place], dips.bend[place]
-    before, after = extremal.state[k], extremal.state[k + 1]
-    a, b, c, d, ta, tb, tc, td = hermite(f)
-    h = extremal.step[k]
-    r, v, normal = np.zeros(3), np.zeros(3), np.zeros(3)
-    dr, dv = np.zeros((3, COLUMNS)), np.zeros((3, COLUMNS))
-    interpolate(h, f, before, after, r, v)
-    level = level_and_gradient(problem.field.inverse_axes, r, normal)
-    X, Y = node_tangents[k], node_tangents[k + 1]
-    for i in range(3):
-        for j in range(7):
-            dr[i, j] = a * X[i, j] + b * h * X[3 + i, j] + c * Y[i, j] + d * h * Y[3 + i, j]
-            dv[i, j] = (ta * X[i, j] + tc * Y[i, j]) / h + tb * X[3 + i, j] + td * Y[3 + i, j]
-    Q = np.zeros((3, 3))
-    add_level_bend(problem.field.inverse_axes, level, normal, 1.0, Q)
-    rate = np.zeros(7)
-    for j in range(7):
-        row[j] = 0.0
-        for i in range(3):
-            row[j] += normal[i] * dr[i, j]
-            rate[j] += normal[i] * dv[i, j]
-            for q in range(3):
-                rate[j] += Q[i, q] * v[q] * dr[i, j]
-    for j in range(7):
-        for q in range(7):
-            total = -rate[j] * rate[q] / bend
-            for i in range(3):
-                for p in range(3):
-                    total += dr[i, j] * Q[i, p] * dr[p, q]
-            hessian[j, q] += weight * total

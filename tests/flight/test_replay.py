@@ -11,7 +11,7 @@ from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.harmonics import harmonics_field
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.flight import control
-from landing_cli.flight.extremal import extremal_rates, extremal_scale, scaled_start, switching
+from landing_cli.flight.extremal import extremal_rates, extremal_scale, scaled_start, thrust_ratio
 from landing_cli.flight.gauss import GAUSS_A, GAUSS_B, GAUSS_C
 from landing_cli.flight.legs import CostateLeg, FinalArcLeg, Leg, ThrustNodesLeg
 from landing_cli.flight.replay import replay, replay_many
@@ -113,21 +113,21 @@ def test_the_extremal_conserves_its_hamiltonian() -> None:
 
     def hamiltonian(y: np.ndarray) -> float:
         rate = np.zeros(14)
-        saturated = switching(scale, y) > 1.0
+        saturated = thrust_ratio(scale.flow, False, y)[0] > 1.0
         extremal_rates(kind, params, scale, saturated, y, rate)
-        u = 1.0 if saturated else switching(scale, y)
+        u = 1.0 if saturated else thrust_ratio(scale.flow, False, y)[0]
         return 0.5 * u * u + y[7:14] @ rate[:7]
 
     y0 = scaled_start(scale, [100.0, 200.0, 500.0], [0.1, 0.2, -0.1], COSTATES.costates)
 
     def rates(t: float, y: np.ndarray) -> np.ndarray:
         out = np.zeros(14)
-        extremal_rates(kind, params, scale, switching(scale, y) > 1.0, y, out)
+        extremal_rates(kind, params, scale, thrust_ratio(scale.flow, False, y)[0] > 1.0, y, out)
         return out
 
     flown = solve_ivp(rates, (0.0, 1.0), y0, method="DOP853", rtol=1e-11, atol=1e-13, max_step=0.01)
     values = [hamiltonian(y) for y in flown.y.T]
-    assert np.ptp([switching(scale, y) for y in flown.y.T]) > 0.5
+    assert np.ptp([thrust_ratio(scale.flow, False, y)[0] for y in flown.y.T]) > 0.5
     assert_allclose(values, values[0], rtol=1e-9)
 
 
@@ -144,7 +144,7 @@ def test_the_extremal_control_minimises_the_hamiltonian() -> None:
             return float(0.5 * u * u + y[10:13] @ thrust / y[6] - y[13] * scale.flow * u)
 
         best = np.zeros(3)
-        control.scaled_thrust(scale, bool(switching(scale, y) > 1.0), y, best)
+        control.scaled_thrust(scale, bool(thrust_ratio(scale.flow, False, y)[0] > 1.0), y, best)
         others = rng.normal(size=(3000, 3))
         others *= (rng.uniform(size=3000) ** (1 / 3) / np.linalg.norm(others, axis=1))[:, None]
         others = np.concatenate([others, best + 0.01 * rng.normal(size=(500, 3))])
