@@ -106,7 +106,7 @@ def delta_v_colours() -> Colormap:
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
-    return ListedColormap(colormaps["viridis"](np.linspace(0.08, 1.0, 256)))
+    return ListedColormap(colormaps["viridis"](np.arange(20, 256)))
 
 
 def to_png(figure: Figure) -> bytes:

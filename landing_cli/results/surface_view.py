@@ -235,7 +235,7 @@ def draw_ellipsoid(axes: Axes, view: View, semi_axes_m: FloatArray, **look: Any)
         axes.plot(*np.where(near[:, None], view.flat(ring * semi_axes_m), np.nan).T, **faint)
 
 
-def draw_triad(axes: Axes, view: View, at: tuple[float, float] = (0.09, 0.1), size: float = 0.075) -> None:
+def draw_triad(axes: Axes, view: View, at: tuple[float, float] = (0.11, 0.1), size: float = 0.075) -> None:
     """Draw the body axes in a corner of a view.
 
     Parameters

@@ -71,11 +71,12 @@ def boundary_figure(result: CaseResult, group: Group) -> Figure:
     section = _section(result, group)
     found = result.summary["section"]
     figure = plotting.new_figure(10.0, 8.2)
-    steps = f"{found['n']} expansion{'' if found['n'] == 1 else 's'}"
+    count = found["n"]
+    steps = f"{found['P_e']} in {count} expansion{'s' * (count > 1)}" if count else "no expansion needed"
     plotting.add_title(
         figure,
         f"{body_name(case)}, {case.name}: section and expansion ask {found['N']} of {len(mesh.faces)} facets",
-        f"{found['P_d']} in the section, {found['P_r']} in the ring, {found['P_e']} in {steps}; "
+        f"{found['P_d']} in the section, {found['P_r']} in the ring, {steps}; "
         f"boundary {'closed' if found['closed'] else 'not closed'}{_agreement(found)}",
     )
     rock = np.tile([[0.88, 0.865, 0.84]], (len(mesh.faces), 1))

@@ -246,7 +246,7 @@ def sights(start: FloatArray, off_deg: float = 30.0) -> tuple[FloatArray, FloatA
     if np.linalg.norm(beside) < 1e-6:  # over a pole
         beside = np.array([0.0, -1.0, 0.0])
     beside /= np.linalg.norm(beside)
-    askew = (beside + np.cross(up, beside)) / np.sqrt(2.0)
+    askew = np.sqrt(0.75) * beside + 0.5 * np.cross(up, beside)
     off = np.deg2rad(off_deg)
     return np.cos(off) * up + np.sin(off) * askew, beside
 
