@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from scipy.integrate import solve_ivp
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.ellipsoid import least_volume_ellipsoid
+from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.body.gravity.harmonics import harmonics_field
 from landing_cli.body.mesh import Mesh
 from landing_cli.flight.spacecraft import Spacecraft
@@ -60,3 +62,30 @@ def some_thrust(intervals: int, level: float = 0.6, seed: int = 0) -> np.ndarray
     t = (np.arange(intervals) + 0.5) / intervals
     waves = np.stack([np.sin(a * t + b) for a, b in rng.uniform(1.0, 4.0, (3, 2))], axis=1)
     return level * waves / np.linalg.norm(waves, axis=1).max()
+
+
+def flown_by_dop853(case: LandingCase, thrust_n: np.ndarray, samples: int = 1) -> np.ndarray:
+    """States in the rotating frame and SI units, ``samples`` an interval, from their own equations.
+
+    Thrust is constant over equal intervals, in the inertial axes that are the body's at the handover.
+    """
+    craft, spin = case.spacecraft, case.asteroid.rotation_rate_rad_s
+    w = np.array([0.0, 0.0, spin])
+    width = case.descent_s / len(thrust_n)
+
+    def rates(t: float, y: np.ndarray, force: np.ndarray) -> np.ndarray:
+        angle = spin * (case.descent_s - t)
+        c, s = np.cos(angle), np.sin(angle)
+        turned = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ force
+        r, v, m = y[:3], y[3:6], y[6]
+        gravity = accelerations(case.asteroid.gravity, r)[0]
+        acceleration = gravity + turned / m - 2 * np.cross(w, v) - np.cross(w, np.cross(w, r))
+        return np.concatenate([v, acceleration, [-np.linalg.norm(force) / (craft.isp_s * 9.80665)]])
+
+    states = [np.concatenate([case.position_m, case.velocity_m_s, [craft.mass_kg]])]
+    for k, force in enumerate(thrust_n):
+        times = np.linspace(k, k + 1, samples + 1) * width
+        span = (times[0], times[-1])
+        flown = solve_ivp(rates, span, states[-1], "DOP853", times, args=(force,), rtol=1e-12, atol=1e-9)
+        states.extend(flown.y[:, 1:].T)
+    return np.array(states)

@@ -4,10 +4,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from landing_samples import asteroid, landing_case, some_thrust, without_gravity
-from scipy.integrate import solve_ivp
+from landing_samples import asteroid, flown_by_dop853, landing_case, some_thrust, without_gravity
 
-from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
@@ -32,28 +30,6 @@ def accurate(scaled: ScaledCase, thrust: np.ndarray, substeps: int) -> np.ndarra
     samples = np.zeros((len(thrust) * substeps + 1, 7))
     fly_accurately(scaled, thrust, samples)
     return samples
-
-
-def body_state_by_dop853(case: LandingCase, thrust: np.ndarray) -> np.ndarray:
-    """The state at handover in the rotating frame and SI units, from its own equations of motion."""
-    craft, spin = case.spacecraft, case.asteroid.rotation_rate_rad_s
-    w = np.array([0.0, 0.0, spin])
-    width = case.descent_s / len(thrust)
-
-    def rates(t: float, y: np.ndarray, force: np.ndarray) -> np.ndarray:
-        angle = spin * (case.descent_s - t)  # inertial axes are the body's at handover
-        c, s = np.cos(angle), np.sin(angle)
-        turned = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ force
-        r, v, m = y[:3], y[3:6], y[6]
-        gravity = accelerations(case.asteroid.gravity, r)[0]
-        acceleration = gravity + turned / m - 2 * np.cross(w, v) - np.cross(w, np.cross(w, r))
-        return np.concatenate([v, acceleration, [-np.linalg.norm(force) / (craft.isp_s * 9.80665)]])
-
-    y = np.concatenate([case.position_m, case.velocity_m_s, [craft.mass_kg]])
-    for k, force in enumerate(thrust * craft.thrust_max_n):
-        span = (k * width, (k + 1) * width)
-        y = solve_ivp(rates, span, y, "DOP853", args=(force,), rtol=1e-12, atol=1e-9).y[:, -1]
-    return y
 
 
 def in_si_and_rotating(case: LandingCase, scaled: ScaledCase, end: np.ndarray) -> np.ndarray:
@@ -96,7 +72,7 @@ def test_the_simple_flight_is_of_second_order() -> None:
 def test_the_accurate_flight_is_of_fourth_order_towards_dop853() -> None:
     case, thrust = strong_case(), some_thrust(5)
     scaled = scale_case(case, 5)
-    truth = body_state_by_dop853(case, thrust)
+    truth = flown_by_dop853(case, thrust * case.spacecraft.thrust_max_n)[-1]
     errors = []
     for substeps in (1, 2, 4, 8):
         end = in_si_and_rotating(case, scaled, accurate(scaled, thrust, substeps)[-1])
@@ -110,7 +86,7 @@ def test_the_accurate_flight_is_of_fourth_order_towards_dop853() -> None:
 def test_two_steps_an_interval_land_within_ten_nanometres_around_bennu() -> None:
     case, thrust = landing_case(), some_thrust(40)
     scaled = scale_case(case, 40)
-    truth = body_state_by_dop853(case, thrust)
+    truth = flown_by_dop853(case, thrust * case.spacecraft.thrust_max_n)[-1]
     end = in_si_and_rotating(case, scaled, accurate(scaled, thrust, 2)[-1])
     np.testing.assert_allclose(end[:3], truth[:3], rtol=0, atol=1e-8)
     np.testing.assert_allclose(end[3:6], truth[3:6], rtol=0, atol=1e-10)
