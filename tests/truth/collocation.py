@@ -152,7 +152,7 @@ def start_through(problem: Problem, n: int, waypoint: np.ndarray | None) -> tupl
 
 
 def starts(problem: Problem, n: int, rng: np.random.Generator) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Starts: straight, over four sides of the ellipsoid, and through a random point."""
+    """Starts: straight, over four sides of the ellipsoid, and through random points."""
     r0, r_c, semi = np.array(problem.r0), np.array(problem.r_c), np.array(problem.semi_axes)
     a, b = r0 / np.linalg.norm(r0), r_c / np.linalg.norm(r_c)
     across = b - np.dot(a, b) * a
@@ -166,7 +166,7 @@ def starts(problem: Problem, n: int, rng: np.random.Generator) -> dict[str, tupl
         "far": -across + 0.3 * (a + b),
         "left": beside + 0.5 * (a + b),
         "right": -beside + 0.5 * (a + b),
-        "random": rng.normal(size=3),
+        **{f"random {i}": rng.normal(size=3) for i in range(3)},
     }
     for name, direction in directions.items():
         direction = direction / np.linalg.norm(direction)

@@ -64,13 +64,13 @@ def bacchus(tof: float) -> Case:
     return Case(f"bacchus_north_pole_{tof:.0f}s", problem, shape)
 
 
-def eros(tof: float) -> Case:
+def eros(tof: float, **reading: str) -> Case:
     shape = read_obj(SHAPES / "eros.obj")
     semi = tuple(np.ceil(least_ellipsoid(shape) * 1e1) / 1e1)
     gravity = ("dipole", 4.4628e5, 0.528, 15364.0)
     r0 = (0.0, 0.0, 16000.0)
     problem = Problem(
-        r0, (0.0, 0.0, 0.0), 3.3117e-4, gravity, 1000.0, 20.0, 400.0, tof, 800.0, semi, np.pi / 3
+        r0, (0.0, 0.0, 0.0), 3.3117e-4, gravity, 1000.0, 20.0, 400.0, tof, 800.0, semi, np.pi / 3, **reading
     )
     return Case(f"eros_north_pole_{tof:.0f}s", problem, shape)
 
@@ -153,6 +153,7 @@ def tables() -> dict[str, Callable[[], list[tuple[Case, Chooser]]]]:
         "bennu_paper": lambda: over_bennu(900.0, spread(5, 3), **paper),
         "bacchus": lambda: [(bacchus(900.0), near_boundary(12, 4)), (bacchus(1600.0), far_side(12))],
         "eros": lambda: [(eros(2500.0), near_boundary(16, 8))],
+        "eros_flown_mass": lambda: [(eros(2500.0, final_mass="flown"), near_boundary(16, 8))],
     }
 
 

@@ -19,7 +19,8 @@ STANDARD_GRAVITY = 9.80665
 # Parameters of the scaled problem, in the order of the parameter vector.
 PARAMETERS = {
     "r0": 3, "v0": 3, "r_c": 3, "normal": 3, "semi_axes": 3, "omega": 1, "t_final": 1, "a_max": 1,
-    "v_exhaust": 1, "cos_theta": 1, "compensate": 1, "gravity": 5, "weight_tau": 1, "weight_j": 1,
+    "v_exhaust": 1, "cos_theta": 1, "compensate": 1, "flown_mass": 1, "gravity": 5,
+    "weight_tau": 1, "weight_j": 1,
 }  # fmt: skip
 
 
@@ -46,6 +47,7 @@ class Problem:
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
     handover: str = "outside"
     final_thrust: str = "compensated"
+    final_mass: str = "handover"  # mass of the final stage: that of the handover all along, or as "flown"
 
     def at(self, r_c: np.ndarray, normal: np.ndarray) -> Problem:
         """The same problem for another facet."""
@@ -87,6 +89,7 @@ class Problem:
             "v_exhaust": self.isp * STANDARD_GRAVITY * T / L,
             "cos_theta": np.cos(self.theta),
             "compensate": float(self.final_thrust == "compensated"),
+            "flown_mass": float(self.final_mass == "flown"),
             "gravity": gravity,
             "weight_tau": weight_tau,
             "weight_j": weight_j,
@@ -143,7 +146,8 @@ def final_stage_function(kind: str, samples: int = 33) -> Any:
     """Final stage from the handover state: thrust ratios along the arc, cone margins, J2.
 
     With time-to-go s, r - r_c = s^2 (A + B s): total acceleration 2A + 6Bs, velocity -(2A + 3Bs) s.
-    The mass is that of the handover all along. The cone margin is taken at both ends of the arc.
+    The mass is that of the handover all along, or falls as the thrust (at the handover's mass, which
+    errs by the square of the fall) is spent. The cone margin is taken at both ends of the arc.
     """
     p, part = symbols()
     x = ca.SX.sym("x", 7)
@@ -157,6 +161,11 @@ def final_stage_function(kind: str, samples: int = 33) -> Any:
         position, velocity = part["r_c"] + s**2 * (A + B * s), -s * (2 * A + 3 * B * s)
         natural = gravity(position, part["gravity"]) - frame_acceleration(part["omega"], position, velocity)
         ratios.append(x[6] / part["a_max"] * (2 * A + 6 * B * s - part["compensate"] * natural))
+    sizes = [ca.sqrt(ca.dot(f, f) + 1e-12) for f in ratios]
+    used, per_step = 0.0, T / (samples - 1) * part["a_max"] / part["v_exhaust"] / x[6]
+    for i in range(samples - 2, -1, -1):  # from handover to touchdown
+        used += per_step * (sizes[i] + sizes[i + 1]) / 2
+        ratios[i] = ratios[i] * (1 - part["flown_mass"] * used)
     cone = []
     for direction in (2 * A, 2 * (A + B * T)):
         along = direction / part["a_max"]
