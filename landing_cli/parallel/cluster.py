@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import logging
+import pickle
 import queue
 import sys
 import time
+import uuid
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
@@ -49,14 +51,17 @@ def run_on_cluster(
         If no scheduler or worker answers, or a worker has another version of this package.
     """
     client = _connect(scheduler)
+    dispatch: _Dispatch[C, R] | None = None
     try:
         _preflight(client, scheduler)
-        dispatch: _Dispatch[C, R] = _Dispatch(client, function, chunks, scheduler)
+        dispatch = _Dispatch(client, function, chunks, scheduler)
         while dispatch.has_work():
             dispatch.submit()
             yield from dispatch.answers()
     finally:
         with suppress(Exception):
+            if dispatch is not None:
+                dispatch.close()
             client.close(timeout=1.0)
 
 
@@ -140,15 +145,23 @@ class _Dispatch(Generic[C, R]):
     def __init__(
         self, client: Any, function: Callable[[Any], R], chunks: Sequence[C], scheduler: str
     ) -> None:
+        from landing_cli.parallel.cluster_worker import RunFunction
+
         self._client = client
-        self._function = function
+        self._run = f"landing-{uuid.uuid4().hex}"
         self._scheduler = scheduler
+        client.register_plugin(RunFunction(self._run, pickle.dumps(function)))
         self._waiting = deque(Attempt(i, chunk) for i, chunk in enumerate(chunks))
         self._suspects: deque[Attempt[C]] = deque()
         self._in_flight: dict[Any, Attempt[C]] = {}
         self._arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._last_sign_of_life = time.monotonic()
         self._room = CHUNKS_IN_FLIGHT_PER_THREAD * sum(_threads_by_worker(client).values())
+
+    def close(self) -> None:
+        """Let the workers forget the function."""
+        if self._client.status == "running":
+            self._client.unregister_worker_plugin(self._run)
 
     def has_work(self) -> bool:
         return bool(self._waiting or self._suspects or self._in_flight)
@@ -163,7 +176,9 @@ class _Dispatch(Generic[C, R]):
             self._send(self._suspects.popleft())
 
     def _send(self, attempt: Attempt[C]) -> None:
-        future = self._client.submit(self._function, attempt.items, pure=False)
+        from landing_cli.parallel.cluster_worker import answer
+
+        future = self._client.submit(answer, self._run, attempt.items, pure=False)
         self._in_flight[future] = attempt
         future.add_done_callback(self._arrived.put)
 
