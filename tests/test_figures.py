@@ -407,4 +407,4 @@ def test_the_title_tells_body_case_and_reachable_area(run: ReachRun) -> None:
     area = facet_areas(run.asteroid.mesh)[fields.reachable].sum() / 1e6
     count = int(fields.reachable.sum())
     assert case_title(run.cases[0]).startswith(f"Ball, pole_300s: {count} of 320 facets reachable (")
-    assert case_title(run.cases[0]).endswith(f"{area:.3g} km²")
+    assert case_title(run.cases[0]).endswith(f"{area:.3f} km²")

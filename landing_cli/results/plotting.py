@@ -14,6 +14,7 @@ from landing_cli.errors import OutputRefused
 from landing_cli.results.disk import replace_file
 
 if TYPE_CHECKING:
+    from matplotlib.axis import Axis
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
@@ -99,6 +100,27 @@ def add_title(figure: Figure, title: str, subtitle: str = "", top_in: float = 0.
     look: dict[str, Any] = {"ha": "left", "va": "top", "parse_math": False}
     figure.text(left, 1 - top_in / height, title, fontsize=12, fontweight="bold", **look)
     figure.text(left, 1 - (top_in + 0.27) / height, subtitle, fontsize=9, color=_TICK, **look)
+
+
+def rule_lengths(ruler: Axis, name: str, *, reverse: bool = False) -> None:
+    """Name an axis of lengths in m, and count it in km where it spans more than a few.
+
+    Parameters
+    ----------
+    ruler : Axis
+        With its limits set, m.
+    name : str
+        What is measured.
+    reverse : bool
+        Whether to print the values with the other sign.
+    """
+    low, high = ruler.get_view_interval()
+    unit, metres = ("km", 1e3) if high - low > 4e3 else ("m", 1.0)
+    sign = -1.0 if reverse else 1.0
+    ruler.set_label_text(f"{name} ({unit})")
+    ruler.set_major_formatter(
+        lambda value, _: f"{sign * value / metres + 0.0:g}".replace("-", "\N{MINUS SIGN}")
+    )
 
 
 def delta_v_colours() -> Colormap:

@@ -110,8 +110,7 @@ def _facet_polygon(corners: FloatArray) -> FloatArray:
 def _edge(a: FloatArray, b: FloatArray) -> FloatArray:
     """Cut an edge so that it bends as it must; the neighbour that shares it cuts it alike."""
     span = abs((lon_lat_deg(b)[0] - lon_lat_deg(a)[0] + 180.0) % 360.0 - 180.0)
-    pieces = 1 if _on_axis(a) or _on_axis(b) else 1 + int(span / _STEP_DEG)
-    share = np.linspace(0.0, 1.0, pieces + 1)[:, None]
+    share = np.linspace(0.0, 1.0, 2 + int(span / _STEP_DEG))[:, None]
     return np.asarray(a + share * (b - a))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.body.mesh import Mesh, facet_normals
-from landing_cli.results.plotting import INK
+from landing_cli.results.plotting import INK, rule_lengths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 _AXES = np.eye(3)
-_MINUS = "\N{MINUS SIGN}"
 _DARKEST = 0.62  # of a shaded facet's colour
 
 
@@ -74,7 +73,7 @@ def label_axes(axes: Axes, view: View) -> None:
     Parameters
     ----------
     axes : Axes
-        Where the view is drawn.
+        Where the view is drawn, with its limits set.
     view : View
         The view.
     """
@@ -84,10 +83,14 @@ def label_axes(axes: Axes, view: View) -> None:
     ):
         along = int(np.argmax(np.abs(direction)))
         named = abs(direction[along]) > 1.0 - 1e-9
-        ruler.set_label_text(f"{'xyz'[along] if named else otherwise} (m)")
-        if named and direction[along] < 0.0:
-            ruler.set_major_formatter(lambda value, _: f"{0.0 - value:g}".replace("-", _MINUS))
+        name = "xyz"[along] if named else otherwise
+        rule_lengths(ruler, name, reverse=bool(named and direction[along] < 0.0))
     axes.set_aspect("equal")
+
+
+def reach_m(mesh: Mesh, view: View) -> float:
+    """Return how far from the middle of a view the surface reaches, to a side or up or down, m."""
+    return float(np.abs(view.flat(mesh.vertices)).max())
 
 
 def draw_surface(axes: Axes, mesh: Mesh, view: View, colours: FloatArray, hatched: Any = None) -> None:
@@ -118,7 +121,9 @@ def draw_surface(axes: Axes, mesh: Mesh, view: View, colours: FloatArray, hatche
     axes.add_collection(PolyCollection(flat, facecolors=shaded, edgecolors=shaded, linewidths=0.35, zorder=2))
     if hatched is not None and hatched[front].any():
         chosen = flat[hatched[front]]
-        axes.add_collection(PolyCollection(chosen, facecolors="none", edgecolors="white", hatch="////", lw=0))
+        axes.add_collection(
+            PolyCollection(chosen, facecolors="none", edgecolors="white", hatch="////", lw=0, zorder=2.1)
+        )
 
 
 def hidden(mesh: Mesh, view: View, points: FloatArray, tolerance_m: float = 1.0) -> NDArray[np.bool_]:
@@ -256,15 +261,15 @@ def draw_triad(axes: Axes, view: View, at: tuple[float, float] = (0.11, 0.1), si
     lengths = np.linalg.norm(arms, axis=1)
     look = {"arrowstyle": "-|>,head_width=0.16,head_length=0.3", "lw": 0.9, "color": INK}
     for name, arm, length, axis in zip("xyz", arms, lengths, _AXES, strict=True):
-        if length > 0.15 * size:
+        if length > 0.35 * size:
             tip = origin + arm * stretch
             arrow = {**look, "shrinkA": 0, "shrinkB": 0}
             axes.annotate("", (tip[0], tip[1]), at, xycoords="axes fraction", arrowprops=arrow, zorder=6)
             place = origin + arm * (1.0 + 0.028 / length) * stretch
         else:  # along the sight, towards the eye or away from it: named where no other arm is
             name = f"{name} {'⊙' if view.depth(axis) > 0 else '⊗'}"
-            rest = -arms.sum(axis=0)
-            place = origin + 0.042 * rest / np.linalg.norm(rest) * stretch
+            rest = arm - arms.sum(axis=0)
+            place = origin + 0.045 * rest / np.linalg.norm(rest) * stretch
         axes.text(
             place[0],
             place[1],
@@ -277,19 +282,19 @@ def draw_triad(axes: Axes, view: View, at: tuple[float, float] = (0.11, 0.1), si
         )
 
 
-def draw_scale_bar(axes: Axes, reach_m: float) -> None:
+def draw_scale_bar(axes: Axes, half_width_m: float) -> None:
     """Draw a round length at the lower left of a view without axes.
 
     Parameters
     ----------
     axes : Axes
-        With limits of plus and minus ``reach_m``.
-    reach_m : float, m
+        With limits of plus and minus ``half_width_m``.
+    half_width_m : float, m
         Half the width of the view.
     """
-    power = 10.0 ** np.floor(np.log10(0.6 * reach_m))
-    length = max(k * power for k in (1.0, 2.0, 5.0) if k * power <= 0.6 * reach_m)
+    power = 10.0 ** np.floor(np.log10(0.6 * half_width_m))
+    length = max(k * power for k in (1.0, 2.0, 5.0) if k * power <= 0.6 * half_width_m)
     text = f"{length / 1e3:g} km" if length >= 1e3 else f"{length:g} m"
-    x, y = -0.95 * reach_m, -0.97 * reach_m
+    x, y = -0.95 * half_width_m, -0.97 * half_width_m
     axes.plot([x, x + length], [y, y], color=INK, lw=1.4, solid_capstyle="butt", zorder=6)
-    axes.text(x, y + 0.04 * reach_m, text, ha="left", va="bottom", fontsize=7.5, zorder=6)
+    axes.text(x, y + 0.04 * half_width_m, text, ha="left", va="bottom", fontsize=7.5, zorder=6)

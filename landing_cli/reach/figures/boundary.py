@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.body.mesh import FloatArray, facet_centroids
+from landing_cli.body.mesh import FloatArray, Mesh, facet_centroids
 from landing_cli.reach.figures.fields import spread_over_mesh
 from landing_cli.reach.figures.parts import START, body_name, draw_arrow_head, sights
 from landing_cli.reach.stored import CaseResult
@@ -19,6 +19,7 @@ from landing_cli.results.surface_view import (
     draw_triad,
     hidden,
     label_axes,
+    reach_m,
     view_from,
 )
 from landing_cli.results.tree import Group
@@ -89,7 +90,7 @@ def boundary_figure(result: CaseResult, group: Group) -> Figure:
             ~hidden(mesh, view, section.points, 8.0) if column == 0 else np.ones(len(mesh.faces), dtype=bool)
         )
         _draw_points(axes, section, view.flat(section.points), seen)
-        _mark_axis(axes, mesh.vertices, view, case.position_m)
+        _mark_axis(axes, mesh, view, case.position_m)
         label_axes(axes, view)
         draw_triad(axes, view)
         axes.set_title(name)
@@ -113,7 +114,8 @@ def _draw_unrolled(axes: Axes, section: _Section, start: FloatArray) -> None:
     seen = np.ones(len(flat), dtype=bool)
     _draw_points(axes, section, flat, seen, jump=180.0)
     axes.set(xlim=(-180, 180), ylim=(middle - 7.5 * h_m, middle + 5.5 * h_m), xticks=range(-180, 181, 60))
-    axes.set(xlabel="azimuth about the axis (°)", ylabel="distance from the\ninitial position (m)")
+    axes.set_xlabel("azimuth about the axis (°)")
+    plotting.rule_lengths(axes.yaxis, "distance from the\ninitial position")
     axes.set_title("c  around the boundary")
 
 
@@ -177,12 +179,12 @@ def _links(section: _Section, boundary: IntArray) -> list[tuple[int, int]]:
     ]
 
 
-def _mark_axis(axes: Axes, vertices: FloatArray, view: View, start: FloatArray) -> None:
+def _mark_axis(axes: Axes, mesh: Mesh, view: View, start: FloatArray) -> None:
     """Set the limits, and mark the initial position or the way to it."""
-    reach = 1.12 * float(np.linalg.norm(vertices, axis=1).max())
+    reach = 1.15 * reach_m(mesh, view)
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach))
     up = start / np.linalg.norm(start)
-    way = view.flat(np.stack([start, up * (vertices @ up).max()]))
+    way = view.flat(np.stack([start, up * (mesh.vertices @ up).max()]))
     if np.linalg.norm(way[0] - way[1]) > 0.02 * reach:
         axes.plot(*way.T, color=plotting.INK, lw=1.0, zorder=5)
         draw_arrow_head(axes, way[1], way[0])

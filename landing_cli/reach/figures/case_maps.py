@@ -37,6 +37,7 @@ from landing_cli.results.surface_view import (
     draw_surface,
     draw_triad,
     label_axes,
+    reach_m,
     view_from,
 )
 
@@ -129,14 +130,15 @@ def _case_figure(
 
 def _frame_view(axes: Axes, mesh: Mesh, view: View, start: FloatArray, whole_way: bool) -> None:
     """Set the limits of a view, and mark the initial position and the way from it to the surface."""
-    reach = 1.12 * float(np.linalg.norm(mesh.vertices, axis=1).max())
+    reach = 1.15 * reach_m(mesh, view)
     up = start / np.linalg.norm(start)
     low, high = np.full(2, -reach), np.full(2, reach)
     if whole_way:
-        margin = 0.12 * reach
-        low = np.minimum(low, view.flat(start) - margin)
-        high = np.maximum(high, view.flat(start) + margin)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), anchor="N")
+        low = np.minimum(low, view.flat(start) - 0.12 * reach)
+        high = np.maximum(high, view.flat(start) + 0.12 * reach)
+        middle, half = 0.5 * (low + high), 0.5 * float((high - low).max())
+        low, high = middle - half, middle + half
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     if view.depth(up) > -1e-9:
         way = view.flat(np.stack([start, up * (mesh.vertices @ up).max()]))
         axes.plot(*way.T, color=plotting.INK, lw=1.0, zorder=5)

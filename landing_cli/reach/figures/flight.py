@@ -90,7 +90,8 @@ def histories_figure(flight: Flight) -> Figure:
     )
     panels = [[figure.add_subplot(grid[i, k]) for k in range(2)] for i in range(3)]
     _draw_vector(panels[0][0], path.t_s, path.position_m, "|r|")
-    panels[0][0].set(ylabel="position (m)", title="a  position, body frame")
+    panels[0][0].set_title("a  position, body frame")
+    plotting.rule_lengths(panels[0][0].yaxis, "position")
     _draw_vector(panels[0][1], path.t_s, path.velocity_m_s, "|v|")
     panels[0][1].set(ylabel="velocity (m/s)", title="b  velocity relative to the rotating body")
     _draw_vector(panels[1][0], path.t_s, path.thrust_n, "|T|", _stairs(flight))

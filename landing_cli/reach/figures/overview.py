@@ -33,7 +33,7 @@ from landing_cli.results.surface_map import (
     lon_lat_deg,
     place_name,
 )
-from landing_cli.results.surface_view import draw_scale_bar, draw_segments, draw_surface, view_from
+from landing_cli.results.surface_view import draw_scale_bar, draw_segments, draw_surface, reach_m, view_from
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -149,10 +149,10 @@ def _draw_globe(axes: Axes, result: CaseResult, scale: ScalarMappable) -> None:
     draw_segments(axes, mesh, view, border, **BORDER)
     up = result.case.position_m / np.linalg.norm(result.case.position_m)
     highest = up * (mesh.vertices @ up).max()
-    way = view.flat(np.stack([1.9 * highest, highest]))
+    way = view.flat(np.stack([highest + 0.9 * reach_m(mesh, view) * up, highest]))
     axes.plot(*way.T, color=plotting.INK, lw=1.0, zorder=5)
     draw_arrow_head(axes, way[1], way[0])
-    reach = 1.22 * float(np.linalg.norm(mesh.vertices, axis=1).max())
+    reach = 1.25 * reach_m(mesh, view)
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
     axes.axis("off")
     draw_scale_bar(axes, reach)

@@ -206,8 +206,9 @@ def case_title(result: CaseResult) -> str:
     found, asked = int(fields.reachable.sum()), int(fields.asked.sum())
     facets = "facets" if fields.asked.all() else "facets asked"
     share = f"{found} of {asked} {facets} reachable ({100.0 * found / max(asked, 1):.1f} %)"
-    area = facet_areas(result.case.asteroid.mesh)[fields.reachable].sum()
-    return f"{body_name(result.case)}, {result.case.name}: {share}, {area / 1e6:.3g} km²"
+    area_km2 = facet_areas(result.case.asteroid.mesh)[fields.reachable].sum() / 1e6
+    area = f"{area_km2:.3f} km²" if area_km2 < 10.0 else f"{area_km2:.0f} km²"
+    return f"{body_name(result.case)}, {result.case.name}: {share}, {area}"
 
 
 def case_facts(case: LandingCase) -> str:
