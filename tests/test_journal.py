@@ -219,6 +219,23 @@ def test_a_different_unfinished_run_is_refused_with_what_changed(recorded: Path)
         assert journal.records == {}
 
 
+@pytest.mark.parametrize(
+    ("stored", "now", "same"),
+    [
+        ("a: 1", "a: 1  # why", True),
+        ("# top\na: 1", "a: 1", True),
+        ("a: 1", "a: 2", False),
+        ('a: "x #1"', 'a: "x #2"', False),
+        ("a: x#1", "a: x#2", False),
+        ("a:\n  b:\n    c: 1", "a:\n  b:\n  c: 1", False),
+        ("a: 1\nb: 2", "a: 1", False),
+    ],
+)
+def test_comments_alone_make_no_other_run(stored: str, now: str, same: bool) -> None:
+    one, two = (RunIdentity("reach run", text, "a", "1") for text in (stored, now))
+    assert (two.differences(one) == []) is same
+
+
 def test_a_second_run_on_one_output_is_refused_at_once_whatever_it_asks(recorded: Path) -> None:
     with opened(recorded, resume=True):
         for choices in ({}, {"resume": True}, {"force": True}):

@@ -9,7 +9,7 @@ from typing import Any, Self
 
 SCHEMA_VERSION = 1
 LISTED_DIFFERENCES = 8
-_COMMENT = re.compile(r"(^|\s)#.*$")
+_COMMENT = re.compile(r"""^([^'"#]*)(?:(?<=\s)|^)#.*$""")  # not within quotes: there it is no comment
 
 
 @dataclass(frozen=True)
@@ -90,10 +90,15 @@ class RunIdentity:
 
 
 def _changed_lines(before: str, now: str) -> list[str]:
-    old, new = ([_COMMENT.sub("", line).strip() for line in text.splitlines()] for text in (before, now))
+    old, new = (_bare_lines(text) for text in (before, now))
     changes = []
     for kind, a, b, c, d in difflib.SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
         if kind != "equal":
-            gone, come = ("; ".join(filter(None, lines)) or "nothing" for lines in (old[a:b], new[c:d]))
+            gone, come = ("; ".join(map(str.strip, lines)) or "nothing" for lines in (old[a:b], new[c:d]))
             changes.append(f"scenario: {gone} -> {come}")
     return changes
+
+
+def _bare_lines(text: str) -> list[str]:
+    lines = (_COMMENT.sub(r"\1", line).rstrip() for line in text.splitlines())
+    return [line for line in lines if line]
