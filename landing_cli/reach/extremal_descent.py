@@ -27,6 +27,7 @@ from landing_cli.reach.extremal_facet import (
     OPTIMAL,
     STUCK,
     UNCONVERGED,
+    Ended,
     Flight,
     new_flight,
     new_search,
@@ -48,6 +49,10 @@ from landing_cli.reach.records import Binding, FacetSolutions, LandingCase, Verd
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+# Where the thrust is at its bound throughout, the costates' size means nothing and the energy is flat. A
+# search that ends there goes on from costates small enough to throttle somewhere, at most so often.
+PLATEAUS, OFF_PLATEAU = 2, 0.9
 
 # A constraint binds when loosening it by a relative unit is worth more than this part of J.
 SLIGHT_PRESSURE = 1e-5
@@ -137,6 +142,27 @@ def _pressures(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _least_ratio(flow: float, flight: Flight) -> float:
+    """Least thrust that the costates ask for along an extremal; above 1 it is at its bound throughout."""
+    extremal = flight.extremal
+    least, _ = thrust_ratio(flow, False, extremal.state[0])
+    k, t = 0, 0.0
+    while t < 1.0 - 1e-12:
+        least = min(least, thrust_ratio(flow, False, extremal.state[k + 1])[0])
+        t += extremal.step[k]
+        k += 1
+    return least
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _is_better(ended: Ended, status: int, energy: float, broken: float) -> bool:
+    """Whether a search ended better than the best before it."""
+    if ended.status == OPTIMAL and status == OPTIMAL:
+        return ended.energy < energy
+    return ended.status == OPTIMAL or (status != OPTIMAL and ended.broken < broken)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def search_batch(
     problem: ExtremalProblem,
     targets: Floats,
@@ -176,16 +202,22 @@ def search_batch(
                 continue
             for a in range(7):
                 costates[a] = starts[i, s, a]
-            ended, last = search_extremal(
-                problem, targets[i], normals[i], costates, here, there, spare, search
-            )
-            found.rounds[i] += ended.rounds
-            if ended.status == OPTIMAL or ended.broken < found.broken[i]:
-                found.status[i], found.energy[i] = ended.status, ended.energy
-                found.broken[i] = ended.broken
-                found.costates[i] = costates
-                _pressures(problem, targets[i], last, search.multipliers, found.pressure[i])
-            if ended.status == OPTIMAL:
+            for _ in range(1 + PLATEAUS):
+                ended, last = search_extremal(
+                    problem, targets[i], normals[i], costates, here, there, spare, search
+                )
+                found.rounds[i] += ended.rounds
+                if _is_better(ended, found.status[i], found.energy[i], found.broken[i]):
+                    found.status[i], found.energy[i] = ended.status, ended.energy
+                    found.broken[i] = ended.broken
+                    found.costates[i] = costates
+                    _pressures(problem, targets[i], last, search.multipliers, found.pressure[i])
+                least = _least_ratio(problem.field.scale.flow, last)
+                if ended.status != OPTIMAL or least <= 1.0:
+                    break
+                for a in range(7):  # step off the plateau
+                    costates[a] *= OFF_PLATEAU / least
+            if found.status[i] == OPTIMAL:
                 break
 
 
