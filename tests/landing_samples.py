@@ -52,7 +52,7 @@ def landing_case(body: Asteroid | None = None, **changes: Any) -> LandingCase:
 
 def without_gravity(scaled: ScaledCase) -> ScaledCase:
     params = np.zeros_like(scaled.gravity_params)
-    params.setflags(write=False)
+    params.setflags(write=scaled.gravity_params.flags.writeable)
     return scaled._replace(gravity_params=params)
 
 
