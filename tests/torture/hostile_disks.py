@@ -110,7 +110,8 @@ def _second_run(reference: Reference, folder: Path) -> Tally:
     tally = Tally(f"{reference.program.name}: two runs on one output")
     output = folder / "twice" / "run.h5"
     command = reference.program.command(output)
-    first = subprocess.Popen(command, env=environment(), stdout=subprocess.DEVNULL)
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    first = subprocess.Popen(command, env=environment(), **quiet)
     while first.poll() is None and not output.with_name("run.h5.journal").exists():
         time.sleep(0.01)
     first.send_signal(signal.SIGSTOP)  # it must still be at work, however fast it is
