@@ -154,6 +154,14 @@ def test_the_longest_step_is_where_the_ray_leaves_the_cone(gap: float) -> None:
     assert left > 200
 
 
+def test_a_ray_into_the_apex_stops_there() -> None:
+    """Its two roots coincide, so that round-off may leave no root at all."""
+    rng = np.random.default_rng(9)
+    for _ in range(300):
+        s, speed = interior(rng, rng.uniform(0.1, 3.0)), 10.0 ** rng.uniform(-2, 2)
+        assert longest_step(*s, *(-speed * s)) == pytest.approx(1.0 / speed, rel=1e-6)
+
+
 def test_the_longest_step_in_special_directions() -> None:
     inside = (2.0, 1.0, 0.0, 0.0)
     assert longest_step(*inside, 0.0, 0.0, 0.0, 0.0) == UNBOUNDED

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from landing_samples import asteroid, flown_by_dop853, landing_case, some_thrust, without_gravity
 
+from landing_cli.body.gravity.field_values import gradients
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
@@ -46,6 +47,23 @@ def test_constant_acceleration_is_flown_exactly() -> None:
     position = scaled.position + t * scaled.velocity + 0.5 * t**2 * force
     np.testing.assert_allclose(path.position, position, rtol=0, atol=1e-14)
     np.testing.assert_allclose(path.velocity, scaled.velocity + t * force, rtol=0, atol=1e-14)
+
+
+def test_gravity_is_taken_where_the_flight_is_in_the_middle_of_the_interval() -> None:
+    case, thrust = strong_case(), some_thrust(6)
+    scaled = scale_case(case, 6)._replace(mass_flow=0.0)
+    weak = scaled.gravity_params * 1e-9  # too weak to bend the flight
+    weak.setflags(write=scaled.gravity_params.flags.writeable)
+    path = flown(scaled._replace(gravity_params=weak), thrust)
+    middle = path.position[:-1] + path.velocity[:-1] / 12 + thrust / 288
+    for k, x in enumerate(middle):
+        angle = scaled.spin * ((k + 0.5) / 6 - 1.0)
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        expected = turn @ gradients(case.asteroid.gravity, turn.T @ x * scaled.length_m)[0] @ turn.T
+        found = path.gradient[k] * 1e9 * scaled.acceleration_m_s2 / scaled.length_m
+        upper = expected[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        np.testing.assert_allclose(found, upper, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 
 def test_mass_falls_with_the_thrust_used() -> None:
