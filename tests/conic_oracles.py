@@ -8,15 +8,8 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
-from landing_cli.optimize.conic_ipm import (
-    ROW_REGULARISATION,
-    Model,
-    Point,
-    advance,
-    fill_row_pull,
-    new_step,
-    residuals,
-)
+from landing_cli.optimize.conic_ipm import ROW_REGULARISATION, advance, fill_row_pull, residuals
+from landing_cli.optimize.conic_records import Model, Point, new_step
 
 JORDAN = np.diag([1.0, -1.0, -1.0, -1.0])
 

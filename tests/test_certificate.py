@@ -9,7 +9,7 @@ from landing_samples import asteroid, landing_case
 
 from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.flight.spacecraft import Spacecraft
-from landing_cli.optimize.conic_ipm import Model, new_model
+from landing_cli.optimize.conic_records import Model, new_model
 from landing_cli.reach.certificate import certified_thrust_level, gravity_bounds, gravity_tube
 from landing_cli.reach.descent_model import fill_arc_cones, fill_glide_cones, fill_handover_rows
 from landing_cli.reach.free_descent import PreparedCase, prepare, solve_prepared, survey

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 
 from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.flight.spacecraft import Spacecraft
-from landing_cli.optimize.conic_ipm import Model, Point, new_model, new_point
+from landing_cli.optimize.conic_records import Model, Point, new_model, new_point
 from landing_cli.reach.descent_model import (
     Cuts,
     Layout,

@@ -9,7 +9,7 @@ from landing_samples import landing_case
 
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.flight.spacecraft import Spacecraft
-from landing_cli.optimize.conic_ipm import Model, Point, new_model, new_point, new_step
+from landing_cli.optimize.conic_records import Model, Point, new_model, new_point, new_step
 from landing_cli.reach.descent_model import Layout, layout, new_cuts
 from landing_cli.reach.free_solve import Solver, cold_start
 from landing_cli.reach.records import LandingCase

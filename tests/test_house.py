@@ -24,6 +24,7 @@ TOOLS = {"sources", "optimize", *PHYSICS}
 RECORDS = {"scenario", "results", "parallel", *TOOLS}
 ROOMS: dict[str, set[str]] = {
     "errors": set(),
+    "compile_cache": set(),
     "parallel": GROUND,
     "body": GROUND,
     "flight": {"body", *GROUND},

@@ -75,6 +75,8 @@ def run_process(command: Callable[[Sequence[str]], int]) -> NoReturn:
     sys.stdout = _GuardedStdout(sys.stdout)
     try:
         code = told(command, sys.argv[1:])
+        for number in _SIGNALS:  # done: the interpreter's end would bring the deadly default back
+            signal.signal(number, signal.SIG_IGN)
     except Interrupted as stop:
         _leave(stop.number)
     sys.exit(code)

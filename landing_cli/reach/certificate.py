@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.bounds import largest_acceleration_outside
 from landing_cli.body.gravity.field_values import accelerations
-from landing_cli.optimize.conic_ipm import Model, Point
+from landing_cli.optimize.conic_records import Model, Point
 from landing_cli.reach.descent_model import Layout
 from landing_cli.reach.scaled_case import ScaledCase, gravity_on_arc
 

@@ -132,6 +132,10 @@ def deliver(
         for i in range(3):
             off_ellipsoid += (end[i] * case.inverse_axes[i]) ** 2
         off_ellipsoid = abs(off_ellipsoid - 1.0)
+        rising = 0.0
+        for i in range(3):
+            rising += handover[i] * handover[3 + i] * case.inverse_axes[i] ** 2
+        off_ellipsoid = max(off_ellipsoid, rising * frame.descent_s / case.length_m**2)
     energy = peak = 0.0
     for k in range(n):
         square = thrust[k, 0] ** 2 + thrust[k, 1] ** 2 + thrust[k, 2] ** 2

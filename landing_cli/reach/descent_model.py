@@ -10,7 +10,8 @@ so that at s = sigma T
     v       = -T [ (sigma - sigma^2 / 2) a_e + sigma^2 / 2 a_s ]        (rotating frame).
 
 Rows: position and velocity match at the handover (6); the handover on the ellipsoid, in that reading (1);
-tangent planes of the ellipsoid at chosen nodes, and the propellant bound (inequalities). Cones on y: the
+tangent planes of the ellipsoid at chosen nodes, the handover reached from outside (in that reading) and the
+propellant bound (inequalities). Cones on y: the
 final stage's thrust at a few points of the arc, and the glide slope at both ends of the arc: r - r_c is
 s^2 times an affine function of s, so both ends inside the convex cone mean the whole arc inside.
 """
@@ -24,7 +25,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from landing_cli.optimize.conic_ipm import Model, Point, fill_row_pull
+from landing_cli.optimize.conic_ipm import fill_row_pull
+from landing_cli.optimize.conic_records import Model, Point
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal, gravity_on_arc
 from landing_cli.reach.shooting import Path, fly, pull_back
 
@@ -63,7 +65,7 @@ def new_cuts(size: int) -> Cuts:
 def layout(case: ScaledCase, n_cuts: int, energy_weight: float, tau_free: bool, level: float) -> Layout:
     """Count rows and cones for a case with ``n_cuts`` tangent planes."""
     n_equal = 7 if case.on_ellipsoid else 6
-    n_rows = n_equal + n_cuts + (1 if case.propellant < 1.0 else 0)
+    n_rows = n_equal + n_cuts + (1 if case.on_ellipsoid else 0) + (1 if case.propellant < 1.0 else 0)
     n_cones = case.arc_fractions.shape[0] + 2
     return Layout(n_equal, n_cuts, n_rows, n_cones, energy_weight, tau_free, level)
 
@@ -209,7 +211,7 @@ def refresh_arc(case: ScaledCase, target: Floats, handover_mass: float, model: M
         if sigma < 1.0:
             rate = 0.5 * case.mass_flow * (norm + last_norm)
             mass *= math.exp(-rate * case.final_time * (last_sigma - sigma))
-        A[0, 0] = 1.0 / mass
+        A[0, 0] = case.arc_share / mass
         last_sigma, last_norm = sigma, norm
     return mass
 
@@ -260,6 +262,23 @@ def _refresh_handover_on_ellipsoid(case: ScaledCase, target: Floats, model: Mode
                     model.y_hessian[1 + a + 3 * p, 1 + b + 3 * q] += (
                         bend * curvature * weights[p] * weights[q]
                     )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _refresh_approach(case: ScaledCase, target: Floats, model: Model, y: Floats, r: int) -> None:
+    """Row r: an ellipsoid is reached from outside, -n . v_p >= 0, in the rotating frame.
+
+    Between its last two nodes a path could else pass below and come up to the handover from inside.
+    """
+    px, py, pz = handover_point(case, target, y)
+    nx, ny, nz = ellipsoid_normal(case, 1.0, 0.0, px, py, pz)
+    _, _, _, _, v_e, v_s = arc_weights(1.0, case.final_time)
+    normal = (nx, ny, nz)
+    model.row_end[r] = 0
+    model.row_y[r, 0] = model.row_value[r] = 0.0
+    for i in range(3):
+        model.row_y[r, 1 + i], model.row_y[r, 4 + i] = -v_e * normal[i], -v_s * normal[i]
+        model.row_value[r] -= normal[i] * (v_e * y[1 + i] + v_s * y[4 + i])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -322,7 +341,7 @@ def _add_mass_gradient(case: ScaledCase, point: Point, path: Path, model: Model)
     h, costate = 1.0 / n, 0.0
     for j in range(case.arc_fractions.shape[0]):
         inverse = model.cone_map[j, 0, 0]
-        costate += point.cone_dual[j, 0] * point.y[0] * inverse * inverse
+        costate += point.cone_dual[j, 0] * point.y[0] * inverse * inverse / case.arc_share
     for k in range(n - 1, -1, -1):
         F, pull = point.thrust[k], model.row_pull[k]
         power = pull[0] * F[0] + pull[1] * F[1] + pull[2] * F[2]
@@ -380,6 +399,7 @@ def refresh(
         model.y_gradient[3 + i] = rho * weight * (2.0 * s + e)
     if case.on_ellipsoid:
         _refresh_handover_on_ellipsoid(case, target, model, point)
+        _refresh_approach(case, target, model, y, plan.n_equal + plan.n_cuts)
     _refresh_cuts(case, path, model, cuts, plan, iteration >= retake_from)
     if case.propellant < 1.0:
         _refresh_propellant(case, point, path, model, plan.n_rows - 1, touchdown_mass)

@@ -13,16 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from landing_cli.optimize.conic_ipm import (
-    Model,
-    Point,
-    Step,
-    advance,
-    new_model,
-    new_point,
-    new_step,
-    residuals,
-)
+from landing_cli.optimize.conic_ipm import advance, residuals
+from landing_cli.optimize.conic_records import Model, Point, Step, new_model, new_point, new_step
 from landing_cli.reach.certificate import certified_thrust_level, linearised_thrust_level
 from landing_cli.reach.descent_model import (
     Cuts,
@@ -76,7 +68,7 @@ def new_solver(case: ScaledCase) -> Solver:
     """Allocate a solver for a scaled case."""
     n = case.mid_cos.shape[0]
     n_cones = case.arc_fractions.shape[0] + 2
-    n_rows = 7 + (n + 1) + 1
+    n_rows = 7 + (n + 1) + 2
     return Solver(
         new_point(n, n_cones, n_rows),
         new_model(n, n_cones, n_rows),

@@ -39,6 +39,7 @@ from landing_cli.scenario.schema import Reach
 from landing_cli.scenario.show import to_yaml
 
 COMPILING = "compiling the kernels (once after an installation; about half a minute)"
+COMPILING_FACETS = 8
 
 
 @dataclass(frozen=True)
@@ -121,10 +122,12 @@ def run(
     if journal is None:
         return Outcome(run_from_result(read(output)), up_to_date=True)
     with journal:
+        cases = landing_cases(scenario, built)
+        prepared = _prepare(cases)
         if not are_compiled():
             say(COMPILING)
-        cases = landing_cases(scenario, built)
-        found = ReachRun(_solve(scenario.reach, cases, journal, options, progress))
+            _compile(prepared)
+        found = ReachRun(_solve(scenario.reach, cases, prepared, journal, options, progress))
         taken = {"jobs": options.plan.jobs, "backend": options.plan.backend, "resumed": int(options.resume)}
         attributes = {"mission": "reach"}
         finish_output(
@@ -133,18 +136,29 @@ def run(
     return Outcome(found, up_to_date=False)
 
 
+def _prepare(cases: tuple[tuple[str, LandingCase], ...]) -> tuple[PreparedCase, ...]:
+    """Compute what the facets of each case share."""
+    shared = survey(cases[0][1])
+    return tuple(prepare(case, shared) for _, case in cases)
+
+
+def _compile(prepared: tuple[PreparedCase, ...]) -> None:
+    """Compile in the parent, by solving a few facets, so that no worker waits or compiles again."""
+    facets = len(prepared[0].shared.centroids_m)
+    solve_items(prepared, facets, np.arange(0, facets, max(1, facets // COMPILING_FACETS)))
+
+
 def _solve(
     reach: Reach,
     cases: tuple[tuple[str, LandingCase], ...],
+    prepared: tuple[PreparedCase, ...],
     journal: Journal,
     options: RunOptions,
     progress: Callable[[int, int], None],
 ) -> tuple[CaseResult, ...]:
     """Solve all cases by the scenario's method."""
-    shared = survey(cases[0][1])
-    prepared = tuple(prepare(case, shared) for _, case in cases)
     traverse = reach.method == "traverse" or options.compare
-    total = len(cases) * len(shared.centroids_m) if traverse else 0
+    total = len(cases) * len(prepared[0].shared.centroids_m) if traverse else 0
     done = 0
 
     def told(more: int) -> None:

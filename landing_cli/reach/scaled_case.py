@@ -20,8 +20,9 @@ from landing_cli.reach.records import LandingCase
 Floats = NDArray[np.float64]
 
 # Fractions of the final stage's time-to-go at which its thrust bound is imposed. a* is linear in time, so
-# two ends would do for it alone; gravity along the arc bends the real thrust between them.
-ARC_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
+# two ends would do for it alone; gravity along the arc bends the real thrust between them, the more so the
+# stronger it is against the thrust.
+FEW_FRACTIONS, MANY_FRACTIONS, STRONG_GRAVITY = 5, 17, 0.02
 
 # Inside this fraction of the ellipsoid an iterate's gravity is taken at its radial projection: no path
 # that is accepted goes there, and the iterates must not meet the field's singularities.
@@ -40,6 +41,7 @@ class ScaledCase(NamedTuple):
     inverse_axes: Floats  # (3,) of the keep-out ellipsoid
     tan_half_angle: float
     arc_fractions: Floats  # (A,)
+    arc_share: float  # share of the thrust bound that the final stage may use
     compensated: bool
     on_ellipsoid: bool
     gravity_kind: int
@@ -67,6 +69,7 @@ def scale_case(case: LandingCase, n_intervals: int) -> ScaledCase:
     node_angle = scaled_spin * (np.arange(n_intervals + 1) / n_intervals - 1.0)
     mid_angle = scaled_spin * ((np.arange(n_intervals) + 0.5) / n_intervals - 1.0)
     unbounded = craft.propellant_kg is None
+    strong = case.asteroid.gm_m3_s2 / np.min(case.ellipsoid_m) ** 2 > STRONG_GRAVITY * a0
     return ScaledCase(
         position=turn @ case.position_m / length,
         velocity=turn @ inertial_velocity * duration / length,
@@ -76,11 +79,12 @@ def scale_case(case: LandingCase, n_intervals: int) -> ScaledCase:
         propellant=2.0 if unbounded else float(craft.propellant_kg or 0.0) / craft.mass_kg,
         inverse_axes=length / np.asarray(case.ellipsoid_m, dtype=np.float64),
         tan_half_angle=math.tan(case.glide_slope_half_angle_rad),
-        arc_fractions=np.array(ARC_FRACTIONS),
+        arc_fractions=np.linspace(0.0, 1.0, MANY_FRACTIONS if strong else FEW_FRACTIONS),
+        arc_share=1.0,
         compensated=case.final_stage_thrust == "compensated",
         on_ellipsoid=case.handover == "on_ellipsoid",
         gravity_kind=int(case.asteroid.gravity.kind),
-        gravity_params=case.asteroid.gravity.params,
+        gravity_params=case.asteroid.gravity.params.copy(),  # writable, as it comes out of a pickle
         length_m=length,
         acceleration_m_s2=a0,
         node_cos=np.cos(node_angle),
