@@ -6,18 +6,8 @@ import numpy as np
 import pytest
 from conic_oracles import ByClarabel, DenseNewton, Sizes, copy_of, iterate, rows_on_thrust
 
-from landing_cli.optimize.conic_ipm import (
-    FRACTION_TO_BOUNDARY,
-    Model,
-    Point,
-    Step,
-    advance,
-    fill_row_pull,
-    new_model,
-    new_point,
-    new_step,
-    residuals,
-)
+from landing_cli.optimize.conic_ipm import FRACTION_TO_BOUNDARY, advance, fill_row_pull, residuals
+from landing_cli.optimize.conic_records import Model, Point, Step, new_model, new_point, new_step
 
 SIZES = {
     "energy": Sizes(6, 4, 6, 6, False),
