@@ -113,7 +113,8 @@ class CaseReport:
     facets, flown : int
         In the table, and flown again.
     worst : mapping of str to Worst
-        By what was checked; ``stored_<column>`` compares a stored column with the flight.
+        By what was checked, causes before effects; ``stored_<column>`` compares a stored column with the
+        flight.
     faults : tuple of Fault
         What cannot be true in the table.
     final_thrust_ratio : float
@@ -148,14 +149,14 @@ class CaseReport:
 
     @property
     def reason(self) -> str:
-        """What is wrong, the worst first; empty where nothing is."""
+        """What is wrong, causes before effects, with the facet where it is worst; empty where nothing is."""
         if self.faults:
             more = f" (and {len(self.faults) - 1} more faults)" if len(self.faults) > 1 else ""
             return f"{self.case}: {self.faults[0].told}{more}"
-        failing = {name: w for name, w in self.worst.items() if w.failing}
-        if not failing:
+        name = next((name for name, worst in self.worst.items() if worst.failing), None)
+        if name is None:
             return ""
-        name, worst = max(failing.items(), key=lambda item: _badness(item[1]))
+        worst = self.worst[name]
         told = (
             f"{self.case}: facet {worst.facet}: {name} {worst.value:.3g}, at most {worst.limit:g} is allowed"
         )
