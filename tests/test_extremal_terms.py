@@ -20,7 +20,7 @@ from landing_cli.reach.costate_dynamics import (
     new_extremal,
     tangents,
 )
-from landing_cli.reach.ellipsoid_dips import dip_row, find_dips, new_dips
+from landing_cli.reach.ellipsoid_dips import LEVEL, dip_row, find_dips, new_dips
 from landing_cli.reach.extremal_terms import (
     MAX_ROWS,
     N_ARC,
@@ -33,6 +33,7 @@ from landing_cli.reach.extremal_terms import (
     final_energy,
     handover_hessian,
     handover_rows,
+    with_guard,
 )
 
 TARGET_M, NORMAL = np.array([120.0, 60.0, 210.0]), np.array([0.36, 0.48, 0.8])
@@ -49,10 +50,10 @@ def handover_state(problem: ExtremalProblem) -> np.ndarray:
     return np.concatenate([r / scale.length_m, v * scale.time_s / scale.length_m, [m]])
 
 
-def rows_at(problem: ExtremalProblem, x: np.ndarray, guard: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def rows_at(problem: ExtremalProblem, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     values, jacobian = np.zeros(MAX_ROWS), np.zeros((ROW_MASS, 7))
     target = TARGET_M / problem.field.scale.length_m
-    handover_rows(problem, target, NORMAL, x, guard, values, jacobian)
+    handover_rows(problem, target, NORMAL, x, values, jacobian)
     return values[:ROW_MASS], jacobian
 
 
@@ -104,7 +105,7 @@ def test_in_the_papers_reading_the_bound_is_on_the_total_acceleration_alone() ->
 def test_the_guard_is_kept_from_the_thrust_rows_alone() -> None:
     problem = problem_of()
     x = handover_state(problem)
-    change = rows_at(problem, x, 1e-3)[0] - rows_at(problem, x)[0]
+    change = rows_at(with_guard(problem, 1e-3), x)[0] - rows_at(problem, x)[0]
     assert_allclose(change[:N_ARC], -1e-3, rtol=1e-9)
     assert np.all(change[N_ARC:] == 0.0)
 
@@ -176,12 +177,12 @@ def test_a_dip_is_the_least_distance_from_the_ellipsoid_and_its_derivative_agree
     fine, steps, _, _ = fly_by(problem, PUSHES, 3000)
     levels = np.linalg.norm(fine.state[: steps + 1, :3] * problem.field.inverse_axes, axis=1)
     assert 5 < np.argmin(levels) < steps - 5
-    assert_allclose(dips.level[0], levels.min(), rtol=0, atol=1e-5)
+    assert_allclose(dips[0, LEVEL], levels.min(), rtol=0, atol=1e-5)
     X, nodes = np.zeros((STATE, COLUMNS)), np.zeros((30 + MAX_SPLITS + 1, 6, COLUMNS))
     tangents(problem.field, extremal, k, X, nodes)
     row, hessian = np.zeros(7), np.zeros((7, 7))
-    dip_row(problem.field.inverse_axes, extremal, nodes, dips, 0, row, 1.0, hessian)
-    by_differences = differences(lambda c: fly_by(problem, c)[2].level[0], PUSHES, 1e-5)
+    dip_row(problem.field.inverse_axes, extremal, nodes, dips[0], row, 1.0, hessian)
+    by_differences = differences(lambda c: fly_by(problem, c)[2][0, LEVEL], PUSHES, 1e-5)
     assert_allclose(row, by_differences, rtol=0, atol=1e-6)
     assert_allclose(hessian, hessian.T, rtol=0, atol=1e-9)
 

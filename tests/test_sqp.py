@@ -11,7 +11,6 @@ from landing_cli.optimize.sqp import (
     add_secant,
     convexify,
     new_local_model,
-    new_qp_for,
     propose,
     violation,
 )
@@ -69,12 +68,12 @@ def sphere_model(x: np.ndarray, multipliers: np.ndarray, model: LocalModel) -> f
 
 
 def test_a_loop_of_proposals_finds_the_constrained_optimum() -> None:
-    model, qp = new_local_model(3, 2), new_qp_for(3, 2)
+    model = new_local_model(3, 2)
     x, multipliers, step = np.array([1.5, 0.4, 0.9]), np.zeros(2), np.zeros(3)
     for _ in range(12):
         sphere_model(x, multipliers, model)
         convexify(model.hessian)
-        expected = propose(model, 2, 10.0, np.full(3, 0.3), qp, step, multipliers)
+        expected = propose(model, 2, 10.0, np.full(3, 0.3), step, multipliers)
         assert expected > -1e-9
         x += step
     a = np.sqrt((3.0 - 1.44) / 2.0)
@@ -85,12 +84,12 @@ def test_a_loop_of_proposals_finds_the_constrained_optimum() -> None:
 
 def test_rows_that_contradict_each_other_leave_nothing_to_expect_and_a_violation() -> None:
     """x >= 1 and -x >= 0: at the price, every point between is equally bad."""
-    model, qp = new_local_model(1, 2), new_qp_for(1, 2)
+    model = new_local_model(1, 2)
     model.hessian[0, 0] = 1.0
     model.gradient[0] = 0.5
     model.values[:] = [-0.5, -0.5]
     model.jacobian[:] = [[1.0], [-1.0]]
     step, multipliers = np.zeros(1), np.zeros(2)
-    expected = propose(model, 2, 1e4, np.full(1, 1e-6), qp, step, multipliers)
+    expected = propose(model, 2, 1e4, np.full(1, 1e-6), step, multipliers)
     assert expected < 1e-5
     assert violation(model.values, model.equality, model.pooled, 2) == pytest.approx(1.0)

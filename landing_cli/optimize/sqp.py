@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from landing_cli.optimize.elastic_qp import ElasticQP, new_elastic_qp, solve_elastic_qp
+from landing_cli.optimize.elastic_qp import new_elastic_qp, solve_elastic_qp
 
 Floats = NDArray[np.float64]
 
@@ -122,14 +122,8 @@ def _rotate(A: Floats, V: Floats, p: int, q: int) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def new_qp_for(n: int, m: int) -> ElasticQP:
-    """Room for the quadratic program of a model: an unknown for the pool, two rows for an equality."""
-    return new_elastic_qp(n + 1, 2 * m + 1)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def propose(
-    model: LocalModel, m: int, price: float, radius: Floats, qp: ElasticQP, step: Floats, multipliers: Floats
+    model: LocalModel, m: int, price: float, radius: Floats, step: Floats, multipliers: Floats
 ) -> float:
     """Minimise the model of the merit function in the box.
 
@@ -143,8 +137,6 @@ def propose(
         Price of violation.
     radius : (n,) float
         Half-sides of the trust region.
-    qp : ElasticQP
-        Scratch, from ``new_qp_for``.
     step : (n,) float
         Receives the step.
     multipliers : (m,) float
@@ -156,6 +148,7 @@ def propose(
         How much the model expects the merit to fall.
     """
     n = step.shape[0]
+    qp = new_elastic_qp(n + 1, 2 * m + 1)  # one more unknown for the pool, two rows for an equality
     for a in range(n):
         qp.gradient[a], qp.radius[a], qp.rows[0, a] = model.gradient[a], radius[a], 0.0
         for b in range(n):

@@ -7,7 +7,6 @@ and refined on the cubic Hermite interpolant between the step's ends.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -20,6 +19,8 @@ Floats = NDArray[np.float64]
 MAX_DIPS = 4
 # Dips that stay above this level of |xi| do not count.
 FAR = 1.2
+# A dip: the step it lies in, where in the step, |xi|, and the second derivative of |xi| over time.
+STEP, FRACTION, LEVEL, BEND = range(4)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -43,21 +44,10 @@ def add_level_bend(inverse_axes: Floats, level: float, normal: Floats, weight: f
             K[i, j] -= weight * normal[i] * normal[j] / level
 
 
-class Dips(NamedTuple):
-    """Local minima over time of the path's distance from the ellipsoid."""
-
-    step: NDArray[np.int64]  # (D,) the step it lies in
-    fraction: Floats  # (D,) where in the step
-    level: Floats  # (D,) |xi|
-    bend: Floats  # (D,) second derivative of |xi| over time
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
-def new_dips() -> Dips:
-    """Room for the dips of one path."""
-    return Dips(
-        np.zeros(MAX_DIPS, dtype=np.int64), np.zeros(MAX_DIPS), np.zeros(MAX_DIPS), np.zeros(MAX_DIPS)
-    )
+def new_dips() -> Floats:
+    """Room for the dips of one path, (MAX_DIPS, 4)."""
+    return np.zeros((MAX_DIPS, 4))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -86,7 +76,7 @@ def interpolate(h: float, f: float, before: Floats, after: Floats, r: Floats, v:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def find_dips(inverse_axes: Floats, extremal: Extremal, n: int, dips: Dips) -> int:
+def find_dips(inverse_axes: Floats, extremal: Extremal, n: int, dips: Floats) -> int:
     """Find where the path comes near the ellipsoid and leaves again; returns how many places.
 
     The rate of |xi| changes sign from - to + within a step; the place is refined on the cubic Hermite
@@ -114,8 +104,8 @@ def find_dips(inverse_axes: Floats, extremal: Extremal, n: int, dips: Dips) -> i
                 else:
                     lo, f_lo, f_hi = f, rate, 0.5 * f_hi
             if level < FAR:
-                dips.step[count], dips.fraction[count], dips.level[count] = k, f, level
-                dips.bend[count] = max((after - before) / extremal.step[k], 1e-9)
+                dips[count, STEP], dips[count, FRACTION], dips[count, LEVEL] = k, f, level
+                dips[count, BEND] = max((after - before) / extremal.step[k], 1e-9)
                 count += 1
         before = after
     return count
@@ -131,8 +121,7 @@ def dip_row(
     inverse_axes: Floats,
     extremal: Extremal,
     node_tangents: Floats,
-    dips: Dips,
-    place: int,
+    dip: Floats,
     row: Floats,
     weight: float,
     hessian: Floats,
@@ -142,7 +131,7 @@ def dip_row(
     At a dip the time of it does not matter to first order. To second order it does: the Hessian without the
     path's own second derivative, times ``weight``, is added to ``hessian`` (7, 7).
     """
-    k, f, bend = dips.step[place], dips.fraction[place], dips.bend[place]
+    k, f, bend = int(dip[STEP]), dip[FRACTION], dip[BEND]
     before, after = extremal.state[k], extremal.state[k + 1]
     a, b, c, d, ta, tb, tc, td = hermite(f)
     h = extremal.step[k]

@@ -13,7 +13,7 @@ from landing_cli.body.clearance import path_clearance
 from landing_cli.flight.extremal import thrust_ratio
 from landing_cli.reach.costate_dynamics import MAX_SPLITS, fly_extremal
 from landing_cli.reach.delivery import LIMIT_TOLERANCE, Deliveries, Frame
-from landing_cli.reach.ellipsoid_dips import find_dips
+from landing_cli.reach.ellipsoid_dips import LEVEL, find_dips
 from landing_cli.reach.extremal_facet import FINE_STEPS, Flight, new_flight, start_extremal
 from landing_cli.reach.extremal_terms import ExtremalProblem
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
@@ -29,7 +29,7 @@ def _measure_descent(
     field, extremal = problem.field, flight.extremal
     level2, peak = 1e9, 0.0
     for d in range(find_dips(field.inverse_axes, extremal, steps, flight.dips)):
-        level2 = min(level2, flight.dips.level[d] ** 2)
+        level2 = min(level2, flight.dips[d, LEVEL] ** 2)
     for k in range(steps + 1):
         y = extremal.state[k]
         square = 0.0

@@ -43,6 +43,7 @@ from landing_cli.reach.extremal_terms import (
     ExtremalProblem,
     extremal_problem,
     glide_weights,
+    with_guard,
 )
 from landing_cli.reach.free_descent import PreparedCase, prepare, survey
 from landing_cli.reach.records import Binding, FacetSolutions, LandingCase, Verdict, blank_rows
@@ -196,7 +197,7 @@ def search_batch(
     costates = np.zeros(7)
     for i in range(targets.shape[0]):
         found.status[i], found.broken[i], found.energy[i] = UNCONVERGED, math.inf, math.inf
-        search.guard[0] = guards[i]
+        guarded = with_guard(problem, guards[i])
         for s in range(starts.shape[1]):
             if not math.isfinite(starts[i, s].sum()):
                 continue
@@ -204,7 +205,7 @@ def search_batch(
                 costates[a] = starts[i, s, a]
             for _ in range(1 + PLATEAUS):
                 ended, last = search_extremal(
-                    problem, targets[i], normals[i], costates, here, there, spare, search
+                    guarded, targets[i], normals[i], costates, here, there, spare, search
                 )
                 found.rounds[i] += ended.rounds
                 if _is_better(ended, found.status[i], found.energy[i], found.broken[i]):

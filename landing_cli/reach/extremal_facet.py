@@ -14,13 +14,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from landing_cli.optimize.elastic_qp import ElasticQP
 from landing_cli.optimize.sqp import (
     LocalModel,
     add_secant,
     convexify,
     new_local_model,
-    new_qp_for,
     propose,
     violation,
 )
@@ -33,7 +31,7 @@ from landing_cli.reach.costate_dynamics import (
     new_extremal,
     tangents,
 )
-from landing_cli.reach.ellipsoid_dips import Dips, dip_row, find_dips, new_dips
+from landing_cli.reach.ellipsoid_dips import LEVEL, dip_row, find_dips, new_dips
 from landing_cli.reach.extremal_terms import (
     MAX_ROWS,
     ROW_DIPS,
@@ -75,28 +73,21 @@ class Flight(NamedTuple):
     """A flown extremal, its dips and the rows' values."""
 
     extremal: Extremal
-    dips: Dips
+    dips: Floats  # (MAX_DIPS, 4), see ellipsoid_dips
     values: Floats  # (MAX_ROWS,)
 
 
 class Search(NamedTuple):
-    """Everything that a facet's search works in; allocated once and used for many facets."""
+    """What a facet's search keeps from round to round; allocated once and used for many facets."""
 
     model: LocalModel
-    qp: ElasticQP
     multipliers: Floats  # (MAX_ROWS,)
     secant: Floats  # (7, 7) what the exact part of the Hessian leaves out
     old_gradient: Floats  # (7,)
     old_jacobian: Floats  # (MAX_ROWS, 7)
     node_tangents: Floats  # (nodes, 6, 8)
     step: Floats  # (7,)
-    second: Floats  # (7,) corrected step
-    trial: Floats  # (7,)
     radius: Floats  # (7,)
-    spare_rows: Floats  # (2, MAX_ROWS)
-    end_jacobian: Floats  # (ROW_MASS, 7)
-    end_gradient: Floats  # (7,)
-    guard: Floats  # (1,) kept from the thrust bound of the final arc
 
 
 class Ended(NamedTuple):
@@ -123,7 +114,6 @@ def new_search(problem: ExtremalProblem, n_steps: int) -> Search:
         model.pooled[r] = r >= ROW_DIPS or (r == ROW_HANDOVER and not problem.on_ellipsoid)
     return Search(
         model,
-        new_qp_for(N, MAX_ROWS),
         np.zeros(MAX_ROWS),
         np.zeros((N, N)),
         np.zeros(N),
@@ -131,12 +121,6 @@ def new_search(problem: ExtremalProblem, n_steps: int) -> Search:
         np.zeros((n_steps + MAX_SPLITS + 1, 6, COLUMNS)),
         np.zeros(N),
         np.zeros(N),
-        np.zeros(N),
-        np.zeros(N),
-        np.zeros((2, MAX_ROWS)),
-        np.zeros((ROW_MASS, N)),
-        np.zeros(N),
-        np.zeros(1),
     )
 
 
@@ -160,12 +144,12 @@ def _try(
     n_steps = flight.extremal.step.shape[0] - MAX_SPLITS
     k = fly_extremal(problem.field, n_steps, flight.extremal)
     x = flight.extremal.state[k]
-    handover_rows(problem, target, normal, x, search.guard[0], flight.values, search.end_jacobian)
+    handover_rows(problem, target, normal, x, flight.values, np.zeros((ROW_MASS, N)))
     flight.values[ROW_MASS] = x[13]
     rows = ROW_DIPS + find_dips(problem.field.inverse_axes, flight.extremal, k, flight.dips)
     for d in range(rows - ROW_DIPS):
-        flight.values[ROW_DIPS + d] = flight.dips.level[d] - 1.0
-    energy = x[14] + final_energy(problem, target, x, search.end_gradient)
+        flight.values[ROW_DIPS + d] = flight.dips[d, LEVEL] - 1.0
+    energy = x[14] + final_energy(problem, target, x, np.zeros(N))
     broken = violation(flight.values, search.model.equality, search.model.pooled, rows)
     return Trial(k, rows, energy, broken)
 
@@ -183,19 +167,20 @@ def _differentiate(
     """
     model, multipliers = search.model, search.multipliers
     X, K = np.zeros((STATE, COLUMNS)), np.zeros((N, N))
+    end_jacobian, end_gradient = np.zeros((ROW_MASS, N)), np.zeros(N)
     tangents(problem.field, flight.extremal, trial.steps, X, search.node_tangents)
     x = flight.extremal.state[trial.steps]
-    handover_rows(problem, target, normal, x, search.guard[0], model.values, search.end_jacobian)
-    final_energy(problem, target, x, search.end_gradient)
+    handover_rows(problem, target, normal, x, model.values, end_jacobian)
+    final_energy(problem, target, x, end_gradient)
     handover_hessian(problem, target, x, multipliers, K)
     for j in range(N):
         model.gradient[j], model.jacobian[ROW_MASS, j] = X[14, j], X[13, j]
         for r in range(ROW_MASS):
             model.jacobian[r, j] = 0.0
         for i in range(N):
-            model.gradient[j] += search.end_gradient[i] * X[i, j]
+            model.gradient[j] += end_gradient[i] * X[i, j]
             for r in range(ROW_MASS):
-                model.jacobian[r, j] += search.end_jacobian[r, i] * X[i, j]
+                model.jacobian[r, j] += end_jacobian[r, i] * X[i, j]
     for a in range(N):
         for b in range(a + 1):
             total = 0.0
@@ -211,8 +196,7 @@ def _differentiate(
             problem.field.inverse_axes,
             flight.extremal,
             search.node_tangents,
-            flight.dips,
-            r - ROW_DIPS,
+            flight.dips[r - ROW_DIPS],
             model.jacobian[r],
             -multipliers[r],
             model.hessian,
@@ -256,14 +240,14 @@ def _renew_model(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _correct(flight: Flight, rows: int, price: float, search: Search) -> None:
+def _correct(flight: Flight, rows: int, price: float, search: Search, step: Floats) -> None:
     """Second-order correction: aim again, from what the rows turned out to be after the step."""
-    model, kept, unused = search.model, search.spare_rows[0], search.spare_rows[1]
+    model, kept = search.model, np.zeros(rows)
     for r in range(rows):
         kept[r], model.values[r] = model.values[r], flight.values[r]
         for a in range(N):
             model.values[r] -= model.jacobian[r, a] * search.step[a]
-    propose(model, rows, price, search.radius, search.qp, search.second, unused)
+    propose(model, rows, price, search.radius, step, np.zeros(rows))
     for r in range(rows):
         model.values[r] = kept[r]
 
@@ -291,21 +275,19 @@ def _take_step(
     corrected : bool
         Whether the trial is the corrected one, flown in ``spare``.
     """
-    for a in range(N):
-        search.trial[a] = costates[a] + search.step[a]
-    then = _try(problem, target, normal, search.trial, there, search)
+    trial, step = costates + search.step, np.zeros(N)
+    then = _try(problem, target, normal, trial, there, search)
     ratio = (now.energy - then.energy + price * (now.broken - then.broken)) / expected
     if ratio >= 0.5 or then.rows != now.rows:
         return then, ratio, False
-    _correct(there, now.rows, price, search)
-    for a in range(N):
-        search.trial[a] = costates[a] + search.second[a]
-    other = _try(problem, target, normal, search.trial, spare, search)
+    _correct(there, now.rows, price, search, step)
+    trial = costates + step
+    other = _try(problem, target, normal, trial, spare, search)
     better = (now.energy - other.energy + price * (now.broken - other.broken)) / expected
     if better <= ratio:
         return then, ratio, False
     for a in range(N):
-        search.step[a] = search.second[a]
+        search.step[a] = step[a]
     return other, better, True
 
 
@@ -358,9 +340,7 @@ def search_extremal(
             size = max(size, abs(costates[a]))
         for a in range(N):
             search.radius[a] = reach * size
-        expected = propose(
-            search.model, now.rows, price, search.radius, search.qp, search.step, search.multipliers
-        )
+        expected = propose(search.model, now.rows, price, search.radius, search.step, search.multipliers)
         if now.broken < FEASIBLE and expected < SETTLED * (1.0 + abs(now.energy)):
             status = OPTIMAL
             break

@@ -55,6 +55,7 @@ class ExtremalProblem(NamedTuple):
     cos_half_angle: float
     compensated: bool
     on_ellipsoid: bool
+    guard: float  # kept from the thrust bound of the final arc, for what it bulges between the points
 
 
 def extremal_problem(case: LandingCase) -> ExtremalProblem:
@@ -85,6 +86,24 @@ def extremal_problem(case: LandingCase) -> ExtremalProblem:
         cos_half_angle=math.cos(case.glide_slope_half_angle_rad),
         compensated=case.final_stage_thrust == "compensated",
         on_ellipsoid=case.handover == "on_ellipsoid",
+        guard=0.0,
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def with_guard(problem: ExtremalProblem, guard: float) -> ExtremalProblem:
+    """Return the problem with another guard of the thrust bound."""
+    p = problem
+    return ExtremalProblem(
+        p.field,
+        p.position,
+        p.velocity,
+        p.final_time,
+        p.propellant,
+        p.cos_half_angle,
+        p.compensated,
+        p.on_ellipsoid,
+        guard,
     )
 
 
@@ -171,7 +190,7 @@ def final_energy(problem: ExtremalProblem, target: Floats, x: Floats, gradient: 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _thrust_rows(
-    problem: ExtremalProblem, target: Floats, x: Floats, guard: float, values: Floats, jacobian: Floats
+    problem: ExtremalProblem, target: Floats, x: Floats, values: Floats, jacobian: Floats
 ) -> None:
     """Thrust along the final arc, and the propellant left at touchdown.
 
@@ -197,7 +216,7 @@ def _thrust_rows(
         if not problem.compensated:
             _arc_acceleration(problem, target, x, j / n, vector, D)
             pull = _norm_and_slope(vector, D, d_pull)
-        values[j] = 0.5 * (1.0 - (mass * pull) ** 2) - guard
+        values[j] = 0.5 * (1.0 - (mass * pull) ** 2) - problem.guard
         for a in range(7):
             jacobian[j, a] = -mass * pull * (d_mass[a] * pull + mass * d_pull[a])
         last = norm
@@ -212,16 +231,12 @@ def handover_rows(
     target: Floats,
     facet_normal: Floats,
     x: Floats,
-    guard: float,
     values: Floats,
     jacobian: Floats,
 ) -> None:
-    """Fill values and derivatives (.., 7) of the rows that the handover state decides.
-
-    ``guard`` is kept from the thrust bound, for what the thrust bulges between the points.
-    """
+    """Fill values and derivatives (.., 7) of the rows that the handover state decides."""
     normal = np.zeros(3)
-    _thrust_rows(problem, target, x, guard, values, jacobian)
+    _thrust_rows(problem, target, x, values, jacobian)
     _glide_rows(problem, target, facet_normal, x, values, jacobian)
     values[ROW_HANDOVER] = level_and_gradient(problem.field.inverse_axes, x, normal) - 1.0
     for a in range(7):
