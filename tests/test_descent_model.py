@@ -12,7 +12,7 @@ from scipy.integrate import quad
 
 from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.flight.spacecraft import Spacecraft
-from landing_cli.optimize.conic_records import Model, Point, new_model, new_point
+from landing_cli.optimize.conic_ipm import Model, Point, new_model, new_point
 from landing_cli.reach.descent_model import (
     Cuts,
     Layout,
@@ -284,12 +284,14 @@ def gradient_of_the_lagrangian(p: Problem) -> tuple[np.ndarray, np.ndarray]:
 
 def test_the_thrust_gradient_is_that_of_the_lagrangian_mass_included() -> None:
     p = Problem(propellant_kg=None)
+    p.point.cone_dual[:, 0] = 0.02  # so that the mass matters for the descent above all
+    p.refresh()
     held = p.plan.energy_weight / N * p.point.thrust + p.model.row_pull
     found = p.model.thrust_gradient + p.model.row_pull
     truth, _ = gradient_of_the_lagrangian(p)
     through_mass = np.abs(truth - held).max()
-    assert through_mass > 0.02 * np.abs(truth).max()
-    np.testing.assert_allclose(found, truth, rtol=0, atol=0.005 * through_mass)
+    assert through_mass > 0.003 * np.abs(truth).max()
+    np.testing.assert_allclose(found, truth, rtol=0, atol=0.01 * through_mass)
 
 
 def test_without_mass_flow_both_gradients_are_those_of_the_lagrangian() -> None:
