@@ -272,12 +272,18 @@ def _refresh_approach(case: ScaledCase, target: Floats, model: Model, y: Floats,
     """
     px, py, pz = handover_point(case, target, y)
     nx, ny, nz = ellipsoid_normal(case, 1.0, 0.0, px, py, pz)
-    _, _, _, _, v_e, v_s = arc_weights(1.0, case.final_time)
-    normal = (nx, ny, nz)
+    _, _, r_e, r_s, v_e, v_s = arc_weights(1.0, case.final_time)
+    normal, wx = (nx, ny, nz), case.inverse_axes
+    level = nx * px + ny * py + nz * pz
     model.row_end[r] = 0
     model.row_y[r, 0] = model.row_value[r] = 0.0
     for i in range(3):
-        model.row_y[r, 1 + i], model.row_y[r, 4 + i] = -v_e * normal[i], -v_s * normal[i]
+        turn = 0.0  # of the normal, as the handover moves along i
+        for j in range(3):
+            curvature = ((wx[i] * wx[i] if i == j else 0.0) - normal[i] * normal[j]) / level
+            turn += curvature * (v_e * y[1 + j] + v_s * y[4 + j])
+        model.row_y[r, 1 + i] = -v_e * normal[i] - r_e * turn
+        model.row_y[r, 4 + i] = -v_s * normal[i] - r_s * turn
         model.row_value[r] -= normal[i] * (v_e * y[1 + i] + v_s * y[4 + i])
 
 
