@@ -26,10 +26,18 @@ TETRAHEDRON = Mesh(
 )
 
 
-def stored_run(path: Path, verdicts: list[Verdict], j: float = 2.0, tof_s: float = 700.0) -> Path:
-    """Write a run of one case with the given verdicts."""
+def stored_run(
+    path: Path,
+    verdicts: list[Verdict],
+    j: float = 2.0,
+    tof_s: float = 700.0,
+    known: dict[str, list[float]] | None = None,
+) -> Path:
+    """Write a run of one case with the given verdicts and columns."""
     rows = blank_rows(np.arange(FACETS))
     rows["verdict"] = verdicts
+    for name, values in (known or {}).items():
+        rows[name] = values
     rows["performance_index_m2_s3"][rows["verdict"] == Verdict.REACHABLE] = j
     case = LandingCase(
         f"top_{tof_s:g}s",
@@ -146,3 +154,119 @@ def test_a_result_of_another_mission_is_refused(tmp_path: Path, capsys: pytest.C
     write(tmp_path / "t.h5", Group({}), {"mission": "tour", "complete": 1, **identity.as_dict()}, {})
     assert main("landing", ["results", "show", str(tmp_path / "t.h5")]) == ExitCode.REFUSED
     assert "holds a result of 'tour', which this version does not read" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ("--format ply", "ply is binary"),
+        ("--format vtp --table summary", "a map of facets, not of a summary"),
+        ("--format oem --table facets", "an oem holds a trajectory, not the facets table"),
+        ("--format oem", "name it with --facet"),
+        ("--table trajectory", "name it with --facet"),
+        ("--table summary --facet 1", "--facet does not go with the summary table"),
+        ("--facet 1", "add --table trajectory"),
+    ],
+)
+def test_an_export_that_makes_no_sense_is_a_mistake_of_usage(
+    arguments: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = stored_run(tmp_path / "a.h5", [YES, YES, NO, NO])
+    assert main("landing", ["results", "export", str(path), *arguments.split()]) == ExitCode.USAGE
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert told in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ("--table boundary", "this run traced no boundary"),
+        ("--case top_800s", "take one of top_700s"),
+        ("--table trajectory --facet 2", "no flight to it in top_700s: it is unreachable"),
+        ("--table trajectory --facet 4", "take one of 0 to 3"),
+        ("-o a.h5 --force", "is the result that is exported"),
+        ("-o b.csv", "is there already"),
+    ],
+)
+def test_an_export_that_cannot_be_is_refused(
+    arguments: str,
+    told: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = stored_run(tmp_path / "a.h5", [YES, YES, NO, NO]).read_bytes()
+    (tmp_path / "b.csv").write_text("mine")
+    assert main("landing", ["results", "export", "a.h5", *arguments.split()]) == ExitCode.REFUSED
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert told in err
+    assert (tmp_path / "a.h5").read_bytes() == before
+    assert (tmp_path / "b.csv").read_text() == "mine"
+
+
+@pytest.mark.parametrize("form", ["csv", "json", "vtp", "obj"])
+def test_text_goes_to_stdout_or_to_the_same_file(
+    form: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, target = stored_run(tmp_path / "a.h5", [YES, YES, NO, NO]), tmp_path / f"x.{form}"
+    assert main("landing", ["results", "export", str(path), "--format", form]) == 0
+    out, err = capsys.readouterr()
+    assert (len(out) > 100, err) == (True, "")
+    assert main("landing", ["results", "export", str(path), "--format", form, "-o", str(target)]) == 0
+    assert capsys.readouterr() == ("", f"wrote {target}\n")
+    assert target.read_text().rstrip("\n") == out.rstrip("\n")
+    assert sorted(tmp_path.iterdir()) == [path, target]
+
+
+def test_a_binary_map_goes_to_a_file(tmp_path: Path) -> None:
+    path, target = stored_run(tmp_path / "a.h5", [YES, YES, NO, NO]), tmp_path / "x.ply"
+    assert main("landing", ["results", "export", str(path), "--format", "ply", "-o", str(target)]) == 0
+    assert target.read_bytes().startswith(b"ply\nformat binary_little_endian")
+
+
+def told_about(capsys: pytest.CaptureFixture[str], path: Path, facet: int) -> str:
+    assert main("landing", ["results", "show", str(path), "--facet", str(facet), "-q"]) == 0
+    return capsys.readouterr().out.splitlines()[0]
+
+
+def test_show_says_what_is_known_about_a_facet_and_why(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known: dict[str, list[float]] = {
+        "delta_v_m_s": [3.25, 3.25, np.nan, np.nan],
+        "fuel_kg": [1.66, 1.66, np.nan, np.nan],
+        "peak_thrust_ratio": [1.0, 0.5, np.nan, np.nan],
+        "terrain_clearance_min_m": [30.0, -4.0, np.nan, np.nan],
+        "binding": [3, 0, 1, 2],
+        "proved": [0, 0, 1, 0],
+        "violation": [0.0, 0.0, 0.042, 0.003],
+        "thrust_margin": [np.nan, np.nan, np.nan, -0.003],
+    }
+    path = stored_run(tmp_path / "a.h5", [YES, YES, NO, NO], known=known)
+    sentences = [
+        "is reachable: 3.25 m/s, 1.66 kg, peak thrust 100 %; what binds: the glide slope",
+        "is reachable: 3.25 m/s, 1.66 kg, peak thrust 50 %, but the path cuts 4 m into rock; "
+        "what binds: nothing",
+        "is unreachable (proved): it needs at least 104.2 % of the thrust",
+        "is unreachable (not proved): it needs 100.3 % of the thrust to pass around the ellipsoid",
+    ]
+    for facet, sentence in enumerate(sentences):
+        assert told_about(capsys, path, facet) == f"top_700s: facet {facet} {sentence}"
+    assert main("landing", ["results", "show", str(path), "--facet", "2", "--json", "-q"]) == 0
+    (case,) = json.loads(capsys.readouterr().out)["cases"]
+    assert (case["case"], case["verdict"], case["binding"]) == ("top_700s", "unreachable", "thrust")
+    assert case["delta_v_m_s"] is None
+    assert case["handover_position_m"] == [None, None, None]
+    assert main("landing", ["results", "show", str(path), "--facet", "4"]) == ExitCode.REFUSED
+    assert "--facet 4: no such facet; take one of 0 to 3" in capsys.readouterr().err
+
+
+def test_show_says_that_a_facet_is_unresolved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = stored_run(
+        tmp_path / "a.h5", [YES, Verdict.UNRESOLVED, NO, NO], known={"violation": [0, 0.25, 1, 1]}
+    )
+    told = "unresolved: no search converged, the best attempt breaks a limit by 0.25 of its scale"
+    assert told_about(capsys, path, 1) == f"top_700s: facet 1 is {told}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import csv
+import dataclasses
 import io
 import json
 import struct
@@ -21,6 +22,7 @@ from landing_cli.reach.stored import ReachRun
 from landing_cli.results.maps import on_every_facet, to_ply
 from landing_cli.results.oem import to_oem
 from landing_cli.results.tables import to_csv, trajectory_table
+from landing_cli.results.tree import Dataset, Group
 
 CASE = "pole_700s"
 
@@ -84,6 +86,19 @@ def test_the_boundary_is_exported_where_there_is_one(run: ReachRun) -> None:
     assert export_table(run, "boundary", "csv", CASE) == "facet\n0\n1\n2\n"
     with pytest.raises(InputRefused, match="traced no boundary"):
         export_table(run, "boundary", "csv", "pole_900s")
+
+
+def test_a_section_s_lists_stand_below_each_other(run: ReachRun) -> None:
+    lists = {"section": [4, 5, 6], "ring": [7], "expansion": [], "boundary": [1, 2]}
+    members: dict[str, Dataset | Group] = {
+        f"{name}_facets": Dataset(np.array(facets, dtype=np.int32), "1", "facets", (f"{name}_point",))
+        for name, facets in lists.items()
+    }
+    members["domain"] = Dataset(np.eye(12, dtype=np.uint8)[3], "1", "1 inside", ("surface",))
+    case = dataclasses.replace(run.cases[1], boundary=Group(members))
+    text = export_table(ReachRun((case,)), "boundary", "csv", CASE)
+    parts = ["section,4", "section,5", "section,6", "ring,7", "boundary,1", "boundary,2", "domain,3"]
+    assert text.splitlines() == ["part,facet", *parts]
 
 
 def test_wrong_choices_are_refused_with_the_right_ones(run: ReachRun) -> None:

@@ -111,6 +111,26 @@ def test_the_command_prints_a_table_and_json_with_every_check(
     assert main("landing", ["results", "verify", path, "--case", "x"]) == ExitCode.REFUSED
 
 
+def test_an_exported_trajectory_leads_from_the_initial_state_to_the_facet(
+    honest: CaseResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = honest.solutions.rows
+    facet = int(rows["facet"][rows["verdict"] == Verdict.REACHABLE][5])
+    export = ["results", "export", stored(honest, tmp_path / "a.h5"), "--facet", str(facet), "--format"]
+    assert main("landing", [*export, "json", "--table", "trajectory"]) == ExitCode.OK
+    samples = json.loads(capsys.readouterr().out)
+    path = np.array([[sample[f"position_m_{axis}"] for axis in "xyz"] for sample in samples])
+    assert (samples[0]["t_s"], samples[-1]["t_s"]) == (0.0, 700.0)
+    assert_allclose(path[0], honest.case.position_m)
+    assert_allclose(path[-1], ROCK.vertices[ROCK.faces[facet]].mean(axis=0), rtol=0, atol=1e-3)
+    assert main("landing", [*export, "oem"]) == ExitCode.OK
+    lines = capsys.readouterr().out.splitlines()
+    assert "REF_FRAME = ROCK_FIXED" in lines
+    states = [line.split() for line in lines if line.startswith("2030-05-01T00:")]
+    assert len(states) == len(path)
+    assert_allclose(np.array(states)[:, 1:4].astype(float) * 1e3, path, rtol=0, atol=1e-6)
+
+
 def test_threads_change_no_number(honest: CaseResult) -> None:
     assert verify_run((honest,), jobs=1) == verify_run((honest,), jobs=2)
 

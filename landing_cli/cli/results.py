@@ -16,7 +16,6 @@ from landing_cli.cli.options import Force, Json, Output, Quiet, ResultFile, new_
 from landing_cli.errors import InputRefused, OutputRefused, UsageError, VerificationFailed
 
 if TYPE_CHECKING:
-    from landing_cli.reach.stored import CaseResult, ReachRun
     from landing_cli.results.store import StoredResult
 
 app = new_group("Look at, export, draw, verify and compare result files.")
@@ -237,7 +236,11 @@ def _exported(
         return bytes(exports.export_map(run, form.value, case))
     if facet is None:
         return str(exports.export_table(run, table.value, form.value, case)).encode()
-    flown = _module(result, "flown").flown_trajectory(_one_case(run, case), facet)
+    cases = exports.chosen_cases(run, case)
+    if len(cases) > 1:
+        names = ", ".join(chosen.case.name for chosen in cases)
+        raise UsageError("a trajectory is of one case", where="--case", fix=f"take one of {names}")
+    flown = _module(result, "flown").flown_trajectory(cases[0], facet)
     if form is not ExportFormat.OEM:
         return str(exports.export_table(run, table.value, form.value, case, flown)).encode()
     from datetime import UTC, datetime
@@ -248,16 +251,6 @@ def _exported(
     body = parse(result.identity.scenario, "the stored scenario").tree["body"]
     created = datetime.now(UTC).isoformat()
     return to_oem(flown, run.asteroid.name, "lander", body.get("epoch_utc"), created).encode()
-
-
-def _one_case(run: ReachRun, case: str | None) -> CaseResult:
-    from landing_cli.reach.exports import chosen_cases
-
-    cases = chosen_cases(run, case)
-    if len(cases) > 1:
-        names = ", ".join(result.case.name for result in cases)
-        raise UsageError("a trajectory is of one case", where="--case", fix=f"take one of {names}")
-    return cases[0]
 
 
 def _read(path: Path) -> StoredResult:
