@@ -105,23 +105,7 @@ def test_most_facets_beyond_the_boundary_are_proved_where_thrust_stops_them() ->
     assert (a.rows["proved"][beyond] == 1).mean() > 0.9
 
 
-HAIR = "where the least-energy flight misses a limit by a hair, the flight of least thrust is handed out"
-INSIDE = "the last interval may reach the ellipsoid from inside, which saves energy"
-KNOWN = {
-    "bennu_900s": HAIR,
-    "bennu_paper_thrust": HAIR,
-    "eros": HAIR,
-    "bennu_on_ellipsoid": INSIDE,
-    "bennu_paper": INSIDE,
-}
-
-
-def with_known_faults(table: str):
-    marks = [pytest.mark.xfail(strict=True, reason=KNOWN[table])] if table in KNOWN else []
-    return pytest.param(table, marks=marks)
-
-
-@pytest.mark.parametrize("table", [with_known_faults(table) for table in TABLES])
+@pytest.mark.parametrize("table", TABLES)
 def test_energies_agree(table: str) -> None:
     a, limit = answers(table), TABLES[table]
     both = (a.rows["verdict"] == Verdict.REACHABLE) & np.isfinite(a.j)

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 
 from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.flight.spacecraft import Spacecraft
-from landing_cli.optimize.conic_ipm import Model, Point, new_model, new_point
+from landing_cli.optimize.conic_records import Model, Point, new_model, new_point
 from landing_cli.reach.descent_model import (
     Cuts,
     Layout,
@@ -334,6 +334,6 @@ def test_energy_is_that_of_the_two_stages() -> None:
 
 def test_layout_counts_the_rows_that_are_filled() -> None:
     p = Problem(handover="on_ellipsoid")
-    assert (p.plan.n_equal, p.plan.n_cuts, p.plan.n_rows) == (7, 3, 11)
+    assert (p.plan.n_equal, p.plan.n_cuts, p.plan.n_rows) == (7, 3, 12)
     assert p.plan.n_cones == len(p.scaled.arc_fractions) + 2
-    assert p.model.row_end.tolist() == [N] * 6 + [0, *CUT_NODES, N]
+    assert p.model.row_end.tolist() == [N] * 6 + [0, *CUT_NODES, 0, N]
