@@ -41,20 +41,15 @@ class ElasticQP(NamedTuple):
 
 # The iterate and its step, one line each of an array (9, m + 2 n): rows first, then the box's two sides.
 SLACK, GIVE, DUAL, LEFT, WEIGHT, SHIFT, D_SLACK, D_GIVE, D_DUAL = range(9)
-# GIVE is t, zero for rows that do not give way. LEFT is the price less the multiplier, kept by itself because
-# the difference would lose its digits. WEIGHT is D = 1 / (slack / dual + give / left).
+# GIVE is t. LEFT is the price less the multiplier, kept by itself because the difference would lose its
+# digits. Rows that do not give way, the box among them, have GIVE 0 and LEFT infinite, and every formula
+# below holds for them too. WEIGHT is D = 1 / (slack / dual + give / left).
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def new_elastic_qp(n: int, m: int) -> ElasticQP:
     """A zeroed program with room for n unknowns and m rows."""
     return ElasticQP(np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m), np.ones(m), np.ones(n))
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _gives(qp: ElasticQP, m: int, i: int) -> bool:
-    """Whether a row may give way."""
-    return i < m and qp.price[i] < math.inf
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -69,7 +64,7 @@ def _row_dot(qp: ElasticQP, m: int, i: int, d: Floats) -> float:
     return -d[i - m] if i < m + n else d[i - m - n]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _add_rows(qp: ElasticQP, m: int, weights: Floats, out: Floats) -> None:
     """Add A' weights to ``out``."""
     n = out.shape[0]
@@ -80,13 +75,12 @@ def _add_rows(qp: ElasticQP, m: int, weights: Floats, out: Floats) -> None:
         out[j] += weights[m + n + j] - weights[m + j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _factor(qp: ElasticQP, m: int, w: Floats, M: Floats) -> None:
     """Factor H + A' D A."""
     n = qp.gradient.shape[0]
     for i in range(m + 2 * n):
-        soft = w[GIVE, i] / w[LEFT, i] if _gives(qp, m, i) else 0.0
-        w[WEIGHT, i] = 1.0 / (w[SLACK, i] / w[DUAL, i] + soft)
+        w[WEIGHT, i] = 1.0 / (w[SLACK, i] / w[DUAL, i] + w[GIVE, i] / w[LEFT, i])
     for a in range(n):
         for b in range(a + 1):
             total = qp.hessian[a, b]
@@ -111,20 +105,15 @@ def _direction(
     """Newton direction towards complementarity ``target``; ``second`` adds the corrector's products."""
     n = d.shape[0]
     for i in range(m + 2 * n):
-        by_slack, by_give, give = target / w[DUAL, i], 0.0, 0.0
+        by_slack, by_give = target / w[DUAL, i], target / w[LEFT, i]
         if second:
             by_slack -= w[D_SLACK, i] * w[D_DUAL, i] / w[DUAL, i]
-        if _gives(qp, m, i):
-            left = w[LEFT, i]
-            by_give, give = target / left, w[GIVE, i]
-            if second:
-                by_give += w[D_GIVE, i] * w[D_DUAL, i] / left
+            by_give += w[D_GIVE, i] * w[D_DUAL, i] / w[LEFT, i]
         value = qp.values[i] if i < m else qp.radius[(i - m) % n]
-        residual = value + _row_dot(qp, m, i, d) + give - w[SLACK, i]
         # what the row still misses once both complementarity conditions are solved for the slacks
-        w[SHIFT, i] = residual + by_give - give - by_slack + w[SLACK, i]
+        w[SHIFT, i] = value + _row_dot(qp, m, i, d) + by_give - by_slack
         # kept for the back-substitution
-        w[D_SLACK, i], w[D_GIVE, i] = by_slack - w[SLACK, i], by_give - give
+        w[D_SLACK, i], w[D_GIVE, i] = by_slack - w[SLACK, i], by_give - w[GIVE, i]
     for a in range(n):
         total = -qp.gradient[a]
         for b in range(n):
@@ -139,36 +128,34 @@ def _direction(
         change = -w[WEIGHT, i] * (_row_dot(qp, m, i, step) + w[SHIFT, i])
         w[D_DUAL, i] = change
         w[D_SLACK, i] -= w[SLACK, i] / w[DUAL, i] * change
-        if _gives(qp, m, i):
-            w[D_GIVE, i] += w[GIVE, i] / w[LEFT, i] * change
+        w[D_GIVE, i] += w[GIVE, i] / w[LEFT, i] * change
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _longest(qp: ElasticQP, m: int, n: int, w: Floats) -> float:
+def _longest(w: Floats) -> float:
     """Longest step that keeps slacks and multipliers inside."""
     longest = 1e30
-    for i in range(m + 2 * n):
+    for i in range(w.shape[1]):
         if w[D_SLACK, i] < 0.0:
             longest = min(longest, -w[SLACK, i] / w[D_SLACK, i])
         if w[D_DUAL, i] < 0.0:
             longest = min(longest, -w[DUAL, i] / w[D_DUAL, i])
-        if _gives(qp, m, i):
-            if w[D_GIVE, i] < 0.0:
-                longest = min(longest, -w[GIVE, i] / w[D_GIVE, i])
-            if w[D_DUAL, i] > 0.0:
-                longest = min(longest, w[LEFT, i] / w[D_DUAL, i])
+        if w[D_GIVE, i] < 0.0:
+            longest = min(longest, -w[GIVE, i] / w[D_GIVE, i])
+        if w[D_DUAL, i] > 0.0:
+            longest = min(longest, w[LEFT, i] / w[D_DUAL, i])
     return longest
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _gap(qp: ElasticQP, m: int, n: int, w: Floats, step: float) -> float:
+def _gap(w: Floats, step: float) -> float:
     """Mean complementarity after a step along the current direction."""
     total, count = 0.0, 0
-    for i in range(m + 2 * n):
+    for i in range(w.shape[1]):
         dual = w[DUAL, i] + step * w[D_DUAL, i]
         total += (w[SLACK, i] + step * w[D_SLACK, i]) * dual
         count += 1
-        if _gives(qp, m, i):
+        if w[LEFT, i] < math.inf:
             total += (w[GIVE, i] + step * w[D_GIVE, i]) * (w[LEFT, i] - step * w[D_DUAL, i])
             count += 1
     return total / count
@@ -202,7 +189,7 @@ def solve_elastic_qp(qp: ElasticQP, m: int, d: Floats, multipliers: Floats) -> i
     cost = 1.0
     for i in range(m):
         w[SLACK, i] = max(qp.values[i], 0.0) + 0.1
-        if _gives(qp, m, i):
+        if qp.price[i] < math.inf:
             cost = max(cost, -qp.price[i] * qp.values[i])
             w[GIVE, i] = max(-qp.values[i], 0.0) + 0.1
         w[DUAL, i] = min(0.5 * qp.price[i], 0.5)
@@ -210,15 +197,16 @@ def solve_elastic_qp(qp: ElasticQP, m: int, d: Floats, multipliers: Floats) -> i
     for j in range(n):
         w[SLACK, m + j] = w[SLACK, m + n + j] = qp.radius[j]
         w[DUAL, m + j] = w[DUAL, m + n + j] = 0.05 / qp.radius[j]
-    mu, iterations = _gap(qp, m, n, w, 0.0), 0
+        w[LEFT, m + j] = w[LEFT, m + n + j] = math.inf
+    mu, iterations = _gap(w, 0.0), 0
     while iterations < MAX_ITERATIONS:
         iterations += 1
         _factor(qp, m, w, matrix)
         _direction(qp, m, d, 0.0, False, w, matrix, step)
-        length = min(1.0, _longest(qp, m, n, w))
-        ratio = _gap(qp, m, n, w, length) / mu
+        length = min(1.0, _longest(w))
+        ratio = _gap(w, length) / mu
         _direction(qp, m, d, mu * ratio**3, True, w, matrix, step)
-        length = min(1.0, FRACTION_TO_BOUNDARY * _longest(qp, m, n, w))
+        length = min(1.0, FRACTION_TO_BOUNDARY * _longest(w))
         if not length > SHORTEST:  # rounding has the last word
             break
         for j in range(n):
@@ -228,7 +216,7 @@ def solve_elastic_qp(qp: ElasticQP, m: int, d: Floats, multipliers: Floats) -> i
             w[GIVE, i] += length * w[D_GIVE, i]
             w[DUAL, i] += length * w[D_DUAL, i]
             w[LEFT, i] -= length * w[D_DUAL, i]
-        mu = _gap(qp, m, n, w, 0.0)
+        mu = _gap(w, 0.0)
         if mu < TOLERANCE * cost:
             break
     for i in range(m):

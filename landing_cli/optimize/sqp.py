@@ -102,7 +102,7 @@ def convexify(matrix: Floats) -> None:
             matrix[a, b] = total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _rotate(A: Floats, V: Floats, p: int, q: int) -> None:
     """Turn the plane of axes p and q so that A[p, q] vanishes; V collects the rotations."""
     theta = 0.5 * (A[q, q] - A[p, p]) / A[p, q]

@@ -102,7 +102,7 @@ def _step(
     return middle
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _step_to_switch(
     field: Field, saturated: bool, upper: float, y: Floats, rate: Floats, stage: Floats, out: Floats
 ) -> float:
@@ -180,7 +180,7 @@ def fly_extremal(field: Field, n_steps: int, extremal: Extremal) -> int:
     return k
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _share_to_turn(w: float, y: Floats, left: float, smallest: float) -> float:
     """Halve what is left to the next node until lambda_v turns little within it."""
     dx, dy, dz = -y[7] + 2.0 * w * y[11], -y[8] - 2.0 * w * y[10], -y[9]
@@ -196,7 +196,7 @@ def _share_to_turn(w: float, y: Floats, left: float, smallest: float) -> float:
     return part
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _tangent_rates(field: Field, saturated: bool, y: Floats, X: Floats, rate: Floats, D: Floats) -> None:
     """Rates of state and energy (as ``_rates``) and of all tangent columns, (15, 8) each."""
     scale = field.scale
@@ -261,10 +261,10 @@ def tangents(field: Field, extremal: Extremal, n: int, X: Floats, node_tangents:
     rate, stage = np.zeros(STATE), np.zeros(STATE)
     D, S, base = np.zeros((STATE, COLUMNS)), np.zeros((STATE, COLUMNS)), np.zeros((STATE, COLUMNS))
     d_left = np.zeros(COLUMNS)  # of what is left to the next node
-    X[:, :] = 0.0
-    for j in range(7):
-        X[7 + j, j] = 1.0
-    node_tangents[0] = X[:6]
+    for i in range(STATE):
+        for j in range(COLUMNS):
+            X[i, j] = 1.0 if i == 7 + j and j < 7 else 0.0
+    _keep_node(X, node_tangents[0])
     for k in range(n):
         _tangent_step(
             field, extremal.saturated[k], extremal.step[k], extremal.state[k], X, rate, stage, D, S, base
@@ -277,10 +277,18 @@ def tangents(field: Field, extremal: Extremal, n: int, X: Floats, node_tangents:
                 d_left[j] -= dh
                 for i in range(STATE):
                     X[i, j] += X[i, 7] * dh
-        node_tangents[k + 1] = X[:6]
+        _keep_node(X, node_tangents[k + 1])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _keep_node(X: Floats, node: Floats) -> None:
+    """Copy the derivatives of position and velocity."""
+    for i in range(6):
+        for j in range(COLUMNS):
+            node[i, j] = X[i, j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _tangent_step(
     field: Field,
     saturated: bool,
@@ -312,7 +320,7 @@ def _tangent_step(
             S[i, 7] += part * rate[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _answer_of_switch(flow: float, y: Floats, X: Floats, d_left: Floats) -> None:
     """Let the step's length answer, so that u stays 1 at its end."""
     _, norm = thrust_ratio(flow, False, y)

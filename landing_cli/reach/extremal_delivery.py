@@ -21,7 +21,7 @@ from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
 Floats = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _measure_descent(
     problem: ExtremalProblem, flight: Flight, steps: int, path_m: Floats
 ) -> tuple[float, float]:
@@ -41,7 +41,7 @@ def _measure_descent(
     return level2 - 1.0, peak
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _deliver(
     problem: ExtremalProblem,
     frame: Frame,

@@ -107,7 +107,7 @@ def approximate_costates(case: LandingCase, targets_m: Floats) -> Floats:
     return np.concatenate([of_position, of_velocity, of_mass[:, None]], axis=1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _pressures(
     problem: ExtremalProblem, target: Floats, flight: Flight, multipliers: Floats, out: Floats
 ) -> None:
@@ -142,7 +142,7 @@ def _pressures(
         out[_ELLIPSOID] += multipliers[r]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _least_ratio(flow: float, flight: Flight) -> float:
     """Least thrust that the costates ask for along an extremal; above 1 it is at its bound throughout."""
     extremal = flight.extremal
@@ -155,7 +155,7 @@ def _least_ratio(flow: float, flight: Flight) -> float:
     return least
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _is_better(ended: Ended, status: int, energy: float, broken: float) -> bool:
     """Whether a search ended better than the best before it."""
     if ended.status == OPTIMAL and status == OPTIMAL:
@@ -199,10 +199,12 @@ def search_batch(
         found.status[i], found.broken[i], found.energy[i] = UNCONVERGED, math.inf, math.inf
         guarded = with_guard(problem, guards[i])
         for s in range(starts.shape[1]):
-            if not math.isfinite(starts[i, s].sum()):
-                continue
+            given = True
             for a in range(7):
                 costates[a] = starts[i, s, a]
+                given = given and math.isfinite(costates[a])
+            if not given:
+                continue
             for _ in range(1 + PLATEAUS):
                 ended, last = search_extremal(
                     guarded, targets[i], normals[i], costates, here, there, spare, search
@@ -211,7 +213,8 @@ def search_batch(
                 if _is_better(ended, found.status[i], found.energy[i], found.broken[i]):
                     found.status[i], found.energy[i] = ended.status, ended.energy
                     found.broken[i] = ended.broken
-                    found.costates[i] = costates
+                    for a in range(7):
+                        found.costates[i, a] = costates[a]
                     _pressures(problem, targets[i], last, search.multipliers, found.pressure[i])
                 least = _least_ratio(problem.field.scale.flow, last)
                 if ended.status != OPTIMAL or least <= 1.0:

@@ -154,7 +154,7 @@ def _try(
     return Trial(k, rows, energy, broken)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _differentiate(
     problem: ExtremalProblem, target: Floats, normal: Floats, flight: Flight, trial: Trial, search: Search
 ) -> None:
@@ -203,7 +203,7 @@ def _differentiate(
         )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _renew_model(
     problem: ExtremalProblem,
     target: Floats,
@@ -239,7 +239,7 @@ def _renew_model(
     convexify(model.hessian)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _correct(flight: Flight, rows: int, price: float, search: Search, step: Floats) -> None:
     """Second-order correction: aim again, from what the rows turned out to be after the step."""
     model, kept = search.model, np.zeros(rows)
@@ -252,7 +252,7 @@ def _correct(flight: Flight, rows: int, price: float, search: Search, step: Floa
         model.values[r] = kept[r]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _take_step(
     problem: ExtremalProblem,
     target: Floats,
@@ -275,13 +275,16 @@ def _take_step(
     corrected : bool
         Whether the trial is the corrected one, flown in ``spare``.
     """
-    trial, step = costates + search.step, np.zeros(N)
+    trial, step = np.zeros(N), np.zeros(N)
+    for a in range(N):
+        trial[a] = costates[a] + search.step[a]
     then = _try(problem, target, normal, trial, there, search)
     ratio = (now.energy - then.energy + price * (now.broken - then.broken)) / expected
     if ratio >= 0.5 or then.rows != now.rows:
         return then, ratio, False
     _correct(there, now.rows, price, search, step)
-    trial = costates + step
+    for a in range(N):
+        trial[a] = costates[a] + step[a]
     other = _try(problem, target, normal, trial, spare, search)
     better = (now.energy - other.energy + price * (now.broken - other.broken)) / expected
     if better <= ratio:
@@ -291,7 +294,7 @@ def _take_step(
     return other, better, True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def search_extremal(
     problem: ExtremalProblem,
     target: Floats,

@@ -188,7 +188,7 @@ def final_energy(problem: ExtremalProblem, target: Floats, x: Floats, gradient: 
     return total / T**3
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _thrust_rows(
     problem: ExtremalProblem, target: Floats, x: Floats, values: Floats, jacobian: Floats
 ) -> None:
@@ -249,7 +249,7 @@ def glide_weights(end: int, T: float) -> tuple[float, float]:
     return (6.0 / (T * T), 0.0) if end == 0 else (6.0 / (T * T), 2.0 / T)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _glide_rows(
     problem: ExtremalProblem,
     target: Floats,
@@ -281,7 +281,9 @@ def handover_hessian(
 ) -> None:
     """Hessian (7, 7) of J2 less the multipliers times the handover's rows; the mass is held fixed."""
     T = problem.final_time
-    K[:, :] = 0.0
+    for i in range(7):
+        for j in range(7):
+            K[i, j] = 0.0
     for i in range(3):
         K[i, i] += 12.0 / T**3
         K[3 + i, 3 + i] += 4.0 / T
