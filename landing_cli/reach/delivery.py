@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import path_clearance
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
-from landing_cli.reach.scaled_case import ScaledCase
+from landing_cli.reach.scaled_case import ScaledCase, least_between
 from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
 
 Floats = NDArray[np.float64]
@@ -70,7 +70,7 @@ def new_deliveries(size: int) -> Deliveries:
 def _to_body(case: ScaledCase, samples: Floats, path_m: Floats) -> float:
     """Fill body-frame positions, m; return the least r' Re r - 1 of the descent."""
     steps = samples.shape[0] - 1
-    least = 1e9
+    least, before, middle = 1e9, 1e9, 1e9
     for row in range(steps + 1):
         angle = case.spin * (row / steps - 1.0)
         c, s = math.cos(angle), math.sin(angle)
@@ -83,7 +83,13 @@ def _to_body(case: ScaledCase, samples: Floats, path_m: Floats) -> float:
             z * case.length_m,
         )
         a, b, d = x * case.inverse_axes[0], y * case.inverse_axes[1], z * case.inverse_axes[2]
-        least = min(least, a * a + b * b + d * d - 1.0)
+        level = a * a + b * b + d * d - 1.0
+        if row > 0 and row % SUBSTEPS == 0:
+            least = min(least, least_between(before, middle, level))
+        if row % SUBSTEPS == 0:
+            before = level
+        else:
+            middle = level
     return least
 
 

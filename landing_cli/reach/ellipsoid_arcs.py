@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.reach.free_batch import CutBatch
-from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level
+from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level, least_between
 from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
 
 Floats = NDArray[np.float64]
@@ -44,14 +44,24 @@ def lowest_level(case: ScaledCase, position: Floats) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def lowest_level_between(case: ScaledCase, thrust: Floats, samples: Floats) -> float:
-    """Least |xi| of an accurate flight of ``thrust``, between the nodes too; fills ``samples``."""
+    """Least |xi| of an accurate flight of ``thrust``, between the nodes too; fills ``samples``.
+
+    Thrust is constant within an interval, so |xi| is smooth there: a parabola through its ends and its
+    middle finds the dip.
+    """
     steps = samples.shape[0] - 1
     fly_accurately(case, thrust, samples)
-    lowest = 1e9
-    for row in range(1, steps + 1):
+    lowest, before, middle = 1e9, 1e9, 1e9
+    for row in range(steps + 1):
         angle = case.spin * (row / steps - 1.0)
         x = samples[row]
-        lowest = min(lowest, ellipsoid_level(case, math.cos(angle), math.sin(angle), x[0], x[1], x[2]))
+        level = ellipsoid_level(case, math.cos(angle), math.sin(angle), x[0], x[1], x[2])
+        if row > 0 and row % SUBSTEPS == 0:
+            lowest = min(lowest, least_between(before, middle, level))
+        if row % SUBSTEPS == 0:
+            before = level
+        else:
+            middle = level
     return lowest
 
 

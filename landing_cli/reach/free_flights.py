@@ -28,7 +28,7 @@ RETAKE_FROM = 5
 ENERGY_ONLY, MARGIN_WEIGHT = 1.0, 1e-3
 TOUCH = 1.0 - 1e-6
 # |xi| that the tangent planes keep at first. Where a path still dips between two nodes by more than DIP,
-# its planes are raised by half as much again and the facet is solved again, at most RAISES times.
+# its planes are raised by a little more and the facet is solved again, at most RAISES times.
 CUT_LEVEL, RAISES, DIP = 1.0 + 2e-4, 6, 3e-6
 
 
@@ -99,7 +99,7 @@ def _around(question: Question, free_position: Floats, side: float) -> tuple[Bat
         lowest_levels_between(case, flights.thrust[changed], lowest)
         dips = 1.0 - lowest > DIP
         changed = changed[dips]
-        level[changed] += 1.5 * (1.0 - lowest[dips])
+        level[changed] += 1.2 * (1.0 - lowest[dips])
         _solve_again(question, flights, cuts, level, level, changed)
         changed = changed[flights.status[changed] == CONVERGED]
     return flights, froze

@@ -166,6 +166,15 @@ def ellipsoid_level(case: ScaledCase, cosine: float, sine: float, x: float, y: f
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def least_between(first: float, middle: float, last: float) -> float:
+    """Least value of the parabola through three evenly spaced values, between the outer two."""
+    slope, bend = 0.5 * (last - first), 0.5 * (first + last) - middle
+    if bend > 0.0 and abs(slope) < 2.0 * bend:
+        return middle - slope * slope / (4.0 * bend)
+    return min(first, middle, last)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def ellipsoid_normal(
     case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float
 ) -> tuple[float, float, float]:

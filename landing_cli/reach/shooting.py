@@ -18,7 +18,7 @@ from landing_cli.reach.scaled_case import ScaledCase, gravity_and_gradient, grav
 
 Floats = NDArray[np.float64]
 
-# Steps in each interval of an accurate flight.
+# Steps in each interval of an accurate flight: its middle is a sample.
 SUBSTEPS = 2
 
 
