@@ -12,7 +12,7 @@ COMPILE := $(BIN)/pip-compile --quiet --upgrade --strip-extras --no-header --no-
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run test check lint types smoke bench validate lock clean
+.PHONY: help setup run test check lint types smoke bench validate torture lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -44,6 +44,9 @@ smoke: $(RUN_STAMP) ## one short real run, re-flown by another integrator
 
 bench: $(DEV_STAMP) ## time the solvers against the usual ones on the same facets
 	$(BIN)/python -m bench
+
+torture: $(DEV_STAMP) ## kill runs, fill disks, flip bits; print what was tried and what passed
+	$(BIN)/python tests/torture --kills 200
 
 validate: $(DEV_STAMP) ## regenerate docs/validation.md and its figures
 	$(BIN)/python docs/validate.py
