@@ -187,6 +187,30 @@ def test_a_dip_is_the_least_distance_from_the_ellipsoid_and_its_derivative_agree
     assert_allclose(hessian, hessian.T, rtol=0, atol=1e-9)
 
 
+def test_a_dips_hessian_is_exact_where_the_path_is_linear_in_the_costates() -> None:
+    """Throttled, without gravity and mass flow the path is linear; what bends is |xi| and the dip's time."""
+    problem = problem_of()
+    weightless = 1e-12 * problem.field.params
+    weightless.setflags(write=False)
+    scale = problem.field.scale._replace(flow=0.0)
+    problem = problem._replace(field=problem.field._replace(params=weightless, scale=scale))
+    costates = 0.6 * PUSHES
+
+    def row_at(c: np.ndarray, hessian: np.ndarray) -> np.ndarray:
+        extremal, k, dips, count = fly_by(problem, c)
+        assert count == 1 and not extremal.saturated[:k].any()
+        X, nodes, row = np.zeros((STATE, COLUMNS)), np.zeros((30 + MAX_SPLITS + 1, 6, COLUMNS)), np.zeros(7)
+        tangents(problem.field, extremal, k, X, nodes)
+        dip_row(problem.field.inverse_axes, extremal, nodes, dips[0], row, 1.0, hessian)
+        return row
+
+    hessian = np.zeros((7, 7))
+    row_at(costates, hessian)
+    expected = differences(lambda c: row_at(c, np.zeros((7, 7))), costates, 1e-4)
+    # the bend over time is a difference over one step
+    assert_allclose(hessian, expected, rtol=0, atol=0.02 * np.abs(expected).max())
+
+
 def test_a_path_that_stays_away_has_no_dip_and_the_end_is_the_handovers() -> None:
     problem = problem_of()
     assert fly_by(problem, -PUSHES)[3] == 0

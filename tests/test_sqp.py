@@ -93,3 +93,16 @@ def test_rows_that_contradict_each_other_leave_nothing_to_expect_and_a_violation
     expected = propose(model, 2, 1e4, np.full(1, 1e-6), step, multipliers)
     assert expected < 1e-5
     assert violation(model.values, model.equality, model.pooled, 2) == pytest.approx(1.0)
+
+
+def test_a_deep_pool_counts_by_its_worst_row_however_deep() -> None:
+    model = new_local_model(1, 3)
+    model.hessian[0, 0] = 1.0
+    model.values[:] = [-50.0, -20.0, 1.0]
+    model.jacobian[:, 0] = [1.0, -1.0, 0.0]
+    model.pooled[:] = True
+    step, multipliers = np.zeros(1), np.zeros(3)
+    expected = propose(model, 3, 10.0, np.full(1, 2.0), step, multipliers)
+    assert_allclose(step, 2.0, rtol=1e-6)
+    assert_allclose(expected, 10.0 * 2.0 - 0.5 * 4.0, rtol=1e-6)
+    assert_allclose(multipliers, [10.0, 0.0, 0.0], rtol=0, atol=1e-4)
