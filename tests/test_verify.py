@@ -88,7 +88,7 @@ def test_what_the_solvers_store_flies_as_they_say(reading: dict[str, str]) -> No
     assert report.verified, report.reason
     assert 10 < report.flown == reachable < len(ROCK.faces)
     assert report.worst["touchdown_miss_m"].value < 1e-3
-    assert report.worst["integrators_apart_m"].value < 1e-5
+    assert report.worst["integrators_apart_m"].value < (1e-4 if "descent" in reading else 1e-6)
     assert report.polyhedron is not None
     assert 1e-3 < report.polyhedron.median_m <= report.polyhedron.worst_m < 5.0
     assert ("handover_off_ellipsoid" in report.worst) == ("handover" in reading)

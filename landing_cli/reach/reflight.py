@@ -32,8 +32,9 @@ IntArray = NDArray[np.int64]
 
 # Samples in each step of the flown path, and where it comes closest to the ellipsoid.
 SAMPLES, FINE_SAMPLES = 8, 64
-# This close to touchdown the path's direction is that of its acceleration there.
-_BLIND_M = 0.1
+# This close to touchdown the path's direction is that of its acceleration there, unless that is so much less
+# than elsewhere that it turns no more than the last micrometres.
+_BLIND_M, _SLIGHT = 0.1, 1e-3
 
 # Measured columns that a run stores too, under the same names.
 STORED = (
@@ -231,7 +232,10 @@ class _Arc:
     def glide_angle_rad(self, target_m: FloatArray, normal: FloatArray) -> float:
         """Largest angle of the path to the facet's normal, seen from touchdown."""
         offset = self.position_m - target_m
-        offset = np.concatenate([offset[_squares(offset) > _BLIND_M**2], self.acceleration[-1:]])
+        offset = offset[_squares(offset) > _BLIND_M**2]
+        squares = _squares(self.acceleration)
+        if squares[-1] > _SLIGHT**2 * squares.max():
+            offset = np.concatenate([offset, self.acceleration[-1:]])
         along = offset @ normal
         across = np.sqrt(_squares(offset - along[:, None] * normal))
         return float(np.arctan2(across, along).max())

@@ -1,8 +1,9 @@
 """Whether a stored run does what it says: every control flown again, every limit checked on the flight.
 
 The controls are flown open loop by an integrator that did not plan them, in the field they were planned in;
-that integrator is checked against scipy's DOP853 on a few facets of each case. The same controls under the
-gravity of the mesh as a uniform polyhedron show the error of the gravity model; that fails nothing.
+that integrator is checked against scipy's DOP853 on a few facets of each case and on its worst. The same
+controls under the gravity of the mesh as a uniform polyhedron show the error of the gravity model; that fails
+nothing.
 """
 
 from __future__ import annotations
@@ -23,7 +24,13 @@ from landing_cli.parallel import LostChunk, WorkPlan, run_chunks
 from landing_cli.reach.consistency import Fault, faults_of
 from landing_cli.reach.flown import flown_trajectory, rows_with_flight
 from landing_cli.reach.records import Verdict
-from landing_cli.reach.reflight import STORED, Ground, fly_rows, measure_rows, survey_ground
+from landing_cli.reach.reflight import (
+    STORED,
+    Ground,
+    fly_rows,
+    measure_rows,
+    survey_ground,
+)
 from landing_cli.reach.stored import CaseResult
 
 FloatArray = NDArray[np.float64]
@@ -191,7 +198,11 @@ def verify_run(
     asteroid = results[0].case.asteroid
     ground, mesh = survey_ground(asteroid.mesh), asteroid.mesh
     polyhedron = polyhedron_field(mesh.vertices, mesh.faces, asteroid.gm_m3_s2)
-    plan, done, total = WorkPlan(jobs, "threads", None), 0, sum(len(_flyable(result)) for result in results)
+    plan, done, total = (
+        WorkPlan(jobs, "threads", None),
+        0,
+        sum(len(_flyable(result)) for result in results),
+    )
 
     def told(flown: int) -> None:
         nonlocal done
@@ -253,16 +264,18 @@ def _checks(result: CaseResult, stored: NDArray[np.void], measured: NDArray[np.v
     worst = {name: _worst(values, LIMITS[name], facets) for name, values in found.items()}
     for name in STORED:
         apart = np.abs(stored[name] - measured[name])
+        if name == "glide_slope_margin_deg":  # where an arc ends without acceleration it may be understated
+            apart = stored[name] - measured[name]
         if name in RELATIVE:
             worst[f"stored_{name}"] = _worst(apart / np.abs(measured[name]), RELATIVE[name], facets)
         elif name in ABSOLUTE:
             worst[f"stored_{name}"] = _worst(apart, ABSOLUTE[name], facets)
-    return worst | _against_dop853(result, facets)
+    return worst | _against_dop853(result, facets, worst["touchdown_miss_m"].facet)
 
 
-def _against_dop853(result: CaseResult, facets: IntArray) -> dict[str, Worst]:
-    """Fly a sample by both integrators."""
-    chosen = facets[_spread(len(facets), DOP853_FACETS)]
+def _against_dop853(result: CaseResult, facets: IntArray, farthest: int) -> dict[str, Worst]:
+    """Fly a sample by both integrators, and the facet that is missed by most."""
+    chosen = np.union1d(facets[_spread(len(facets), DOP853_FACETS)], farthest)
     apart = []
     for facet in chosen.tolist():
         fast = flown_trajectory(result, facet, integrator="gauss")
@@ -277,7 +290,11 @@ def _against_dop853(result: CaseResult, facets: IntArray) -> dict[str, Worst]:
 
 
 def _model_error(
-    result: CaseResult, rows: IntArray, polyhedron: GravityField, sample: int | None, plan: WorkPlan
+    result: CaseResult,
+    rows: IntArray,
+    polyhedron: GravityField,
+    sample: int | None,
+    plan: WorkPlan,
 ) -> ModelError | None:
     """Fly the controls under the polyhedron and measure how far they miss."""
     if len(rows) == 0 or result.case.asteroid.gravity.kind is GravityKind.POLYHEDRON:
@@ -299,7 +316,11 @@ def _misses(result: CaseResult, field: GravityField, rows: IntArray) -> FloatArr
 
 
 def _gathered(
-    work: Callable[[IntArray], NDArray[Any]], rows: IntArray, size: int, plan: WorkPlan, told: Told
+    work: Callable[[IntArray], NDArray[Any]],
+    rows: IntArray,
+    size: int,
+    plan: WorkPlan,
+    told: Told,
 ) -> NDArray[Any]:
     """Do some work on rows, in chunks on threads, and put the answers in the rows' order."""
     if len(rows) == 0:
