@@ -27,9 +27,10 @@ FREE_LIMIT, CUT_LIMIT = 40, 36
 RETAKE_FROM = 5
 ENERGY_ONLY, MARGIN_WEIGHT = 1.0, 1e-3
 TOUCH = 1.0 - 1e-6
-# |xi| that the tangent planes keep at first. Where a path still dips between two nodes by more than DIP,
-# its planes are raised by a little more and the facet is solved again, at most RAISES times.
-CUT_LEVEL, RAISES, DIP = 1.0 + 2e-4, 6, 3e-6
+# |xi| that the tangent planes keep at first. Where a path still dips between two nodes below FLOOR, its
+# planes are raised by a little more than that and the facet is solved again, at most RAISES times. FLOOR
+# leaves room for what a parabola through three samples misses.
+CUT_LEVEL, FLOOR, RAISES = 1.0 + 2e-4, 1.0 + 1.2e-5, 6
 
 
 class Question(NamedTuple):
@@ -97,9 +98,9 @@ def _around(question: Question, free_position: Floats, side: float) -> tuple[Bat
     for _ in range(RAISES):
         lowest = np.empty(len(changed))
         lowest_levels_between(case, flights.thrust[changed], lowest)
-        dips = 1.0 - lowest > DIP
+        dips = lowest < FLOOR
         changed = changed[dips]
-        level[changed] += 1.2 * (1.0 - lowest[dips])
+        level[changed] += 1.2 * (FLOOR - lowest[dips])
         _solve_again(question, flights, cuts, level, level, changed)
         changed = changed[flights.status[changed] == CONVERGED]
     return flights, froze
