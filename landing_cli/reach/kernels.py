@@ -8,10 +8,25 @@ from typing import Any
 from landing_cli.reach.free_batch import solve_many
 
 
-def are_compiled() -> bool:
-    """Tell whether the facet kernel was compiled before, by this version for this kind of processor."""
-    cache: Any = getattr(solve_many, "_cache", None)
+def are_compiled(descent: str) -> bool:
+    """Tell whether a descent's kernel was compiled before, by this version for this kind of processor.
+
+    Parameters
+    ----------
+    descent : {"free", "extremal"}
+        The family of trajectories.
+    """
+    kernels: list[Any] = [solve_many]
+    if descent == "extremal":
+        from landing_cli.reach.extremal_descent import search_batch
+
+        kernels.append(search_batch)
+    return all(_is_cached(kernel) for kernel in kernels)
+
+
+def _is_cached(kernel: Any) -> bool:
     try:
+        cache = kernel._cache
         return Path(cache.cache_path, cache._cache_file._index_name).exists()
     except AttributeError:  # another numba
         return True

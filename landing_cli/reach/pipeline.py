@@ -124,7 +124,7 @@ def run(
     with journal:
         cases = landing_cases(scenario, built)
         prepared = _prepare(cases)
-        if not are_compiled():
+        if not are_compiled(scenario.reach.descent):
             say(COMPILING)
             _compile(prepared)
         found = ReachRun(_solve(scenario.reach, cases, prepared, journal, options, progress))
