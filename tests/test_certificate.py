@@ -127,6 +127,24 @@ def test_a_bound_does_not_depend_on_the_size_of_its_multipliers() -> None:
         assert bound(factor * x) == pytest.approx(bound(x), rel=1e-12)
 
 
+def test_any_duals_are_made_feasible() -> None:
+    """They balance the rows exactly, sum_j A_j' z_j = A_y' lambda, and lie in their cones."""
+    facets, _ = least_levels()
+    bound = Bound(prepared(), facets[0], spin=1.3)
+    fill_handover_rows(bound.scaled, bound.model)
+    fill_arc_cones(bound.scaled, bound.model)
+    rng = np.random.default_rng(6)
+    for _ in range(10):
+        x, duals = rng.normal(size=bound.size), np.zeros((bound.cones, 4))
+        certified_thrust_level(
+            bound.scaled, bound.target, bound.tube, bound.arc, bound.model, x[:6], x[6:].reshape(-1, 4), duals
+        )
+        balance = np.einsum("jia,ji->a", bound.model.cone_map, duals) - bound.model.row_y[:6].T @ x[:6]
+        np.testing.assert_allclose(balance[1:], 0.0, rtol=0, atol=1e-12)
+        used = duals * np.abs(bound.model.cone_map).max(axis=2).astype(bool)  # a glide cone has three rows
+        assert (duals[:, 0] >= np.linalg.norm(used[:, 1:], axis=1) - 1e-12).all()
+
+
 def test_stronger_gravity_bounds_prove_less() -> None:
     facets, levels = least_levels()
     bound = Bound(prepared(), facets[int(np.argmax(levels))])

@@ -102,13 +102,13 @@ def dense_margins(p: PreparedCase, solutions: FacetSolutions, rows: np.ndarray) 
     )
 
 
-def test_the_ellipsoid_margin_is_the_least_over_the_nodes_and_middles() -> None:
+def test_the_ellipsoid_margin_is_the_least_along_a_dense_flight() -> None:
     p, solutions, reachable = solved()
     hugging = reachable[np.argsort(solutions.rows["ellipsoid_margin"][reachable])][:4]
-    for row in hugging:
-        flown = flown_by_dop853(p.case, solutions.nodes_of(row), 2)[:, :3]
-        margin = np.sum((flown / p.case.ellipsoid_m) ** 2, axis=1).min() - 1.0
-        assert solutions.rows["ellipsoid_margin"][row] == pytest.approx(margin, abs=1e-8)
+    margins = dense_margins(p, solutions, hugging)
+    promised = solutions.rows["ellipsoid_margin"][hugging] - margins
+    assert promised.max() < LIMIT_TOLERANCE
+    assert promised.min() > -1e-4
 
 
 def hand_over(p: PreparedCase, thrust: np.ndarray, facet: int) -> tuple[dict[str, float], np.ndarray]:
@@ -193,7 +193,6 @@ def test_a_handover_off_the_ellipsoid_is_a_violation_in_that_reading() -> None:
     assert values["violation"] == pytest.approx(off, rel=1e-9)
 
 
-@pytest.mark.xfail(strict=True, reason="dips between the samples of the flight are not looked for")
 def test_no_delivered_flight_dips_into_the_ellipsoid_between_its_samples() -> None:
     p, solutions, reachable = solved()
     near = reachable[solutions.rows["ellipsoid_margin"][reachable] < 1e-3]

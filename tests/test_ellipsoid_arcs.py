@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from landing_samples import asteroid, landing_case, some_thrust
+from landing_samples import asteroid, landing_case
 
 from landing_cli.reach.ellipsoid_arcs import (
     arc_cuts,
@@ -13,7 +13,7 @@ from landing_cli.reach.ellipsoid_arcs import (
 )
 from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level, ellipsoid_normal, scale_case
-from landing_cli.reach.shooting import fly_accurately
+from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
 
 N = 20
 
@@ -76,18 +76,25 @@ def test_the_lowest_level_spares_the_start_and_a_handover_that_has_its_own_row(h
     assert last_cut_node(scaled, path) == (N if handover == "outside" else N - 1)
 
 
-def test_between_the_nodes_the_level_is_that_of_the_accurate_flight() -> None:
+def test_between_the_nodes_the_level_is_that_of_a_dense_flight() -> None:
+    """Where a dip falls between the samples, a parabola finds it."""
     case = spinning_case()
-    scaled, thrust = scale_case(case, N), some_thrust(N)
-    thrust[:] = -0.9 * scaled.position / np.linalg.norm(scaled.position)
-    samples, dense = np.zeros((10 * N + 1, 7)), np.zeros((10 * N + 1, 7))
-    fly_accurately(scaled, thrust, dense)
-    times = np.linspace(0, N, 10 * N + 1)
-    expected = min(
-        np.linalg.norm(xi_of(case, scaled, t, x)) for t, x in zip(times[1:], dense[1:, :3], strict=True)
-    )
-    assert lowest_level_between(scaled, thrust, samples) == pytest.approx(expected, rel=1e-12)
-    np.testing.assert_array_equal(samples, dense)
+    scaled = scale_case(case, N)
+    times = np.linspace(0, N, 40 * N + 1)
+    between = 0
+    for depth in np.linspace(0.4, 0.8, 5):
+        thrust = np.zeros((N, 3))
+        aim = np.cross(scaled.position, [0.0, 0.0, 1.0]) * depth - scaled.position
+        thrust[: N // 2] = 0.9 * aim / np.linalg.norm(aim)
+        thrust[N // 2 :] = 0.95 * scaled.position / np.linalg.norm(scaled.position)
+        samples, dense = np.zeros((SUBSTEPS * N + 1, 7)), np.zeros((40 * N + 1, 7))
+        fly_accurately(scaled, thrust, dense)
+        levels = [np.linalg.norm(xi_of(case, scaled, t, x)) for t, x in zip(times, dense[:, :3], strict=True)]
+        found = lowest_level_between(scaled, thrust, samples)
+        assert found == pytest.approx(min(levels), abs=2e-5)
+        np.testing.assert_allclose(samples, dense[:: 40 // SUBSTEPS], rtol=0, atol=1e-9)
+        between += min(levels) < min(levels[:: 40 // SUBSTEPS]) - 1e-4
+    assert between >= 2
 
 
 def planes(scaled: ScaledCase, path: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:

@@ -74,7 +74,7 @@ def test_the_costates_fly_the_same_way_as_the_stored_thrust() -> None:
         angle = case.asteroid.rotation_rate_rad_s * case.descent_s * (1.0 - times[:-1])
         stored = about_z(angle, nodes)
         saturated += np.linalg.norm(nodes, axis=1).max() > 0.999
-        assert np.abs(thrust[:-1] - stored).max() < 3e-4
+        assert np.abs(thrust[:-1] - stored).max() < 2e-3
         miss = np.linalg.norm(states[-1, :3] - rows["handover_position_m"][k])
         assert miss < 4e-4 * case.spacecraft.thrust_max_n / case.spacecraft.mass_kg * case.descent_s**2
     assert saturated > 0
