@@ -68,7 +68,7 @@ ABSOLUTE: Mapping[str, float] = {
     "peak_thrust_ratio": 1e-5,
     "peak_thrust_ratio_descent": 1e-5,
     "peak_thrust_ratio_final": 1e-5,
-    "ellipsoid_margin": 1e-3,  # the least of samples some seconds apart
+    "ellipsoid_margin": 1e-4,  # the least of samples some seconds apart, and of parabolas through them
     "glide_slope_margin_deg": 2e-3,
 }
 
