@@ -132,7 +132,7 @@ def measure_arc(
         handover[5],
         T,
     )
-    mass, delta_v, last = handover_mass, 0.0, 0.0
+    mass, delta_v, last, simpson = handover_mass, 0.0, 0.0, 0.0
     peak = planned = 0.0
     for j in range(ARC_SAMPLES + 1):
         f = 1.0 - j / ARC_SAMPLES
@@ -148,8 +148,12 @@ def measure_arc(
             delta_v += 0.5 * (norm + last) * T / ARC_SAMPLES
             mass = handover_mass * math.exp(-delta_v / exhaust_velocity)
         last = norm
+        simpson += norm * (1.0 if j in (0, ARC_SAMPLES) else 4.0 if j % 2 else 2.0)
         peak = max(peak, mass * norm)
         planned = max(planned, mass * math.sqrt(ax * ax + ay * ay + az * az))
+    # the trapezoid rule does for the masses on the way; what is stored is integrated by Simpson's
+    delta_v = simpson * T / (3.0 * ARC_SAMPLES)
+    mass = handover_mass * math.exp(-delta_v / exhaust_velocity)
     energy = 0.0
     for i in range(3):
         energy += a[i] * a[i] + a[i] * a[3 + i] + a[3 + i] * a[3 + i]

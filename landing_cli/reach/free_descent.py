@@ -19,7 +19,7 @@ from landing_cli.body.adjacency import mean_edge_m
 from landing_cli.body.bvh import SurfaceIndex, build_surface_index
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.reach.certificate import GravityBounds, gravity_bounds, gravity_tube
-from landing_cli.reach.delivery import VALUE_COLUMNS, Frame, deliver_many, new_deliveries
+from landing_cli.reach.delivery import VALUE_COLUMNS, Deliveries, Frame, deliver_many, new_deliveries
 from landing_cli.reach.free_batch import Batch
 from landing_cli.reach.free_flights import Question, best_flights
 from landing_cli.reach.free_solve import CERTIFIED, CONVERGED, STALLED
@@ -35,6 +35,7 @@ FINE_INTERVALS = 100
 # A thrust level below this on the coarse grid may be below 1 on the fine one (its bias is a few 1e-3).
 DOUBTFUL_LEVEL = 1.006
 
+_VIOLATION = VALUE_COLUMNS.index("violation")
 # Shares of the thrust bound that the final stage is given in turn where it exceeded the bound by less.
 ARC_SHARES = (1.0 - 4e-5, 1.0 - 3e-4, 1.0 - 3e-3)
 # Relative to J, a constraint whose loosening would gain less than this does not bind.
@@ -203,11 +204,11 @@ def _on_fine_grid(prepared: PreparedCase, facets: Ints) -> Work:
 def _deliver(prepared: PreparedCase, work: Work, chosen: Ints, flights: Batch) -> None:
     """Fly the converged flights accurately and fill their rows; reachable is what meets every limit."""
     found = np.flatnonzero(flights.status == CONVERGED)
-    places, rows, scaled = chosen[found], work.rows, work.question.case
+    rows, scaled = work.rows, work.question.case
     if len(found) == 0:
         return
-    facets = rows["facet"][places]
-    out = new_deliveries(len(places))
+    facets = rows["facet"][chosen[found]]
+    out = new_deliveries(len(found))
     deliver_many(
         scaled,
         prepared.frame,
@@ -217,6 +218,10 @@ def _deliver(prepared: PreparedCase, work: Work, chosen: Ints, flights: Batch) -
         prepared.shared.normals[facets],
         out,
     )
+    # a flight that breaks a limit does not take the place of one that keeps them all
+    better = (out.values[:, _VIOLATION] == 0.0) | (rows["verdict"][chosen[found]] != Verdict.REACHABLE)
+    found, out = found[better], Deliveries(out.values[better], out.handover[better])
+    places = chosen[found]
     work.thrust[places] = flights.thrust[found]
     for column, name in enumerate(VALUE_COLUMNS):
         rows[name][places] = out.values[:, column]
@@ -282,7 +287,14 @@ def solve_prepared(prepared: PreparedCase, facets: NDArray[np.integer]) -> Facet
     if len(again) == 0:
         return solutions
     finer = _solutions(prepared, _on_fine_grid(prepared, indices[again]))
-    return replace_rows(solutions, again, finer)
+    resolved = np.flatnonzero(finer.rows["verdict"] != Verdict.UNRESOLVED)
+    return replace_rows(solutions, again[resolved], take_rows(finer, resolved))
+
+
+def take_rows(solutions: FacetSolutions, places: Ints) -> FacetSolutions:
+    """Take some rows, with their thrust nodes."""
+    nodes = [solutions.nodes_of(place) for place in places]
+    return FacetSolutions(solutions.rows[places], np.concatenate([np.zeros((0, 3)), *nodes]).reshape(-1, 3))
 
 
 def replace_rows(solutions: FacetSolutions, places: Ints, better: FacetSolutions) -> FacetSolutions:
