@@ -10,11 +10,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.body.adjacency import facet_neighbours
 from landing_cli.body.mesh import Mesh, facet_centroids, facet_normals
+from landing_cli.kernel import kernel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -137,7 +137,7 @@ def _pseudonormals(mesh: Mesh, normals: FloatArray) -> FloatArray:
     return result
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def box_distance2(boxes: FloatArray, node: int, x: float, y: float, z: float) -> float:
     """Squared distance from a point to the box of a node, m2."""
     b = boxes[node]
@@ -150,14 +150,14 @@ def box_distance2(boxes: FloatArray, node: int, x: float, y: float, z: float) ->
     return du * du + dv * dv + dw * dw
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _edge_distance2(px: float, py: float, pz: float, ex: float, ey: float, ez: float, along: float) -> float:
     """Squared distance of p (from the edge's tail) to the point at a share of the edge e."""
     dx, dy, dz = px - along * ex, py - along * ey, pz - along * ez
     return dx * dx + dy * dy + dz * dz
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def triangle_distance2(triangles: FloatArray, slot: int, x: float, y: float, z: float) -> tuple[float, int]:
     """Squared distance from a point to a facet, m2, and the feature that is closest.
 
@@ -193,7 +193,7 @@ def triangle_distance2(triangles: FloatArray, slot: int, x: float, y: float, z: 
     return height * height, FACE
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def closest_slot(
     surface: SurfaceIndex, x: float, y: float, z: float, bound2: float, slot: int, feature: int
 ) -> tuple[float, int, int]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.body.bvh import (
@@ -15,6 +14,7 @@ from landing_cli.body.bvh import (
     closest_slot,
     triangle_distance2,
 )
+from landing_cli.kernel import kernel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -58,7 +58,7 @@ def contains(surface: SurfaceIndex, points: ArrayLike) -> NDArray[np.bool_]:
     return np.asarray(signed_distances(surface, points) < 0.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _with_sign(
     surface: SurfaceIndex, distance2: float, slot: int, feature: int, x: float, y: float, z: float
 ) -> float:
@@ -76,7 +76,7 @@ def _with_sign(
     return -np.sqrt(distance2) if side < 0.0 else np.sqrt(distance2)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def signed_distance(
     surface: SurfaceIndex, x: float, y: float, z: float, upper_bound: float
 ) -> tuple[float, int]:
@@ -102,7 +102,7 @@ def signed_distance(
     return _with_sign(surface, distance2, slot, feature, x, y, z), surface.facets[slot]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _signed_distance_from(
     surface: SurfaceIndex, x: float, y: float, z: float, slot: int
 ) -> tuple[float, int]:
@@ -112,7 +112,7 @@ def _signed_distance_from(
     return _with_sign(surface, distance2, slot, feature, x, y, z), slot
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def signed_distances_into(
     surface: SurfaceIndex, points: FloatArray, distances: FloatArray, facets: IntArray
 ) -> None:
@@ -123,7 +123,7 @@ def signed_distances_into(
         facets[i] = surface.facets[slot]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def path_clearance(
     surface: SurfaceIndex, path: FloatArray, free_radius: float, tolerance: float, spacing: float
 ) -> tuple[float, int]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import partial, singledispatch
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
@@ -23,6 +22,7 @@ from landing_cli.flight.extremal import (
 )
 from landing_cli.flight.gauss import GAUSS_C, STAGES, sample_extremal
 from landing_cli.flight.legs import CostateLeg, FinalArcLeg, Leg, ThrustNodesLeg
+from landing_cli.kernel import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -216,7 +216,7 @@ def _costate_sampled(leg: CostateLeg, w: float, ve: float) -> SampledControl:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _arc_thrust(
     kind: int,
     params: FloatArray,

@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.kernels import acceleration, potential
+from landing_cli.kernel import kernel
 
 FloatArray = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def natural_acceleration(
     kind: int, params: FloatArray, w: float, x: float, y: float, z: float, vx: float, vy: float, vz: float
 ) -> tuple[float, float, float]:
@@ -41,7 +41,7 @@ def natural_acceleration(
     return gx + w * (2.0 * vy + w * x), gy + w * (-2.0 * vx + w * y), gz
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def rk4_step(
     kind: int,
     params: FloatArray,
@@ -98,14 +98,14 @@ def rk4_step(
     out[6] = m + h * dm
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def turn(angle: float, vector: FloatArray, out: FloatArray) -> None:
     """Write a vector turned about +z by an angle (rad) into ``out``."""
     c, s = math.cos(angle), math.sin(angle)
     out[0], out[1], out[2] = c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fly_nodes(
     kind: int,
     params: FloatArray,
@@ -150,7 +150,7 @@ def fly_nodes(
         rk4_step(kind, params, w, ve, h, states[k], start, middle, end, states[k + 1])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _jacobi_constants(
     kind: int, params: FloatArray, w: float, position: FloatArray, velocity: FloatArray, out: FloatArray
 ) -> None:

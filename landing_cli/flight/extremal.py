@@ -10,11 +10,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.body.gravity.kernel_types import VectorAndSymmetric
 from landing_cli.body.gravity.kernels import acceleration_and_gradient
+from landing_cli.kernel import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -104,14 +104,14 @@ def scaled_start(
     return np.concatenate([position, velocity, [1.0], np.asarray(costates, dtype=np.float64)])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def thrust_ratio(flow: float, saturated: bool, y: FloatArray) -> tuple[float, float]:
     """Return u and the norm of lambda_v; unsaturated, u is the switching function (Zhao 2022, eqs 10-11)."""
     norm = max(math.sqrt(y[10] * y[10] + y[11] * y[11] + y[12] * y[12]), 1e-12)
     return 1.0 if saturated else norm / y[6] + flow * y[13], norm
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def rates_in_gravity(
     scale: ExtremalScale, saturated: bool, y: FloatArray, g: VectorAndSymmetric, out: FloatArray
 ) -> None:
@@ -148,7 +148,7 @@ def rates_in_gravity(
     out[13] = -u * norm / (m * m)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def extremal_rates(
     kind: int, params: FloatArray, scale: ExtremalScale, saturated: bool, y: FloatArray, out: FloatArray
 ) -> None:
@@ -158,7 +158,7 @@ def extremal_rates(
     rates_in_gravity(scale, saturated, y, g, out)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def scaled_thrust(scale: ExtremalScale, saturated: bool, y: FloatArray, out: FloatArray) -> None:
     """Write the thrust vector over its bound (Zhao 2022, eqs 9-10)."""
     u, norm = thrust_ratio(scale.flow, saturated, y)

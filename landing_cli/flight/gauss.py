@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.flight.dynamics import natural_acceleration
 from landing_cli.flight.extremal import ExtremalScale, extremal_rates, scaled_thrust, thrust_ratio
+from landing_cli.kernel import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ _GAUSS_AA = GAUSS_A @ GAUSS_A
 _GAUSS_BA = GAUSS_B @ GAUSS_A
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fly_sampled(
     kind: int,
     params: FloatArray,
@@ -115,7 +115,7 @@ def fly_sampled(
     return worst
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _stage_masses(
     h: float, ve: float, m: float, control: FloatArray, per_mass: bool, mass: FloatArray
 ) -> float:
@@ -133,7 +133,7 @@ def _stage_masses(
     return m * math.exp(-total) if per_mass else m - total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _extremal_step(
     kind: int,
     params: FloatArray,
@@ -171,7 +171,7 @@ def _extremal_step(
             out[a] += h * GAUSS_B[j] * K[j, a]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _first_crossing(scale: ExtremalScale, saturated: bool, stages: FloatArray, out: FloatArray) -> float:
     """Return the fraction of the step by which the switching function has crossed 1; 2 if it has not."""
     for i in range(STAGES):
@@ -182,7 +182,7 @@ def _first_crossing(scale: ExtremalScale, saturated: bool, stages: FloatArray, o
     return 2.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def sample_extremal(
     kind: int,
     params: FloatArray,
@@ -244,7 +244,7 @@ def sample_extremal(
     return k
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _to_the_kink(
     kind: int,
     params: FloatArray,

@@ -21,8 +21,7 @@ so that an inequality row has lambda = -eta with eta >= 0 complementary to its s
 
 from __future__ import annotations
 
-from numba import njit
-
+from landing_cli.kernel import kernel
 from landing_cli.optimize.conic_records import Y_SIZE, Model, Point, Step
 from landing_cli.optimize.second_order_cone import (
     UNBOUNDED,
@@ -38,7 +37,7 @@ FRACTION_TO_BOUNDARY = 0.98
 ROW_REGULARISATION = 1e-9
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fill_row_pull(point: Point, model: Model, n_rows: int) -> None:
     """Fill ``model.row_pull`` from the rows and their multipliers."""
     model.row_pull[:, :] = 0.0
@@ -49,7 +48,7 @@ def fill_row_pull(point: Point, model: Model, n_rows: int) -> None:
                 model.row_pull[k, i] += multiplier * model.row_thrust[r, k, i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def residuals(
     point: Point, model: Model, step: Step, n_equal: int, n_rows: int, n_cones: int, tau_free: bool
 ) -> tuple[float, float, float]:
@@ -103,7 +102,7 @@ def residuals(
     return primal, dual, gap
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _scale_cones(point: Point, model: Model, step: Step, n_cones: int) -> None:
     """Scale the cones on y and start the order-7 system with their Hessians."""
     reduced = step.reduced
@@ -122,7 +121,7 @@ def _scale_cones(point: Point, model: Model, step: Step, n_cones: int) -> None:
                 reduced[a, b] += A[0, a] * g0 + A[1, a] * g1 + A[2, a] * g2 + A[3, a] * g3
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _eliminate_nodes(point: Point, model: Model, step: Step, n_rows: int) -> None:
     """Scale every node's cone and add its share of the Schur complement."""
     schur, coupling = step.schur, step.coupling
@@ -156,7 +155,7 @@ def _eliminate_nodes(point: Point, model: Model, step: Step, n_rows: int) -> Non
                     schur[i, j] += b0 * T[0] + b1 * T[1] + b2 * T[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def factorise(
     point: Point, model: Model, step: Step, n_equal: int, n_rows: int, n_cones: int, tau_free: bool
 ) -> None:
@@ -193,10 +192,10 @@ def factorise(
             for i in range(n_rows):
                 total += coupling[i, a] * solved[i, b]
             step.reduced[a, b] = total
-    cholesky(step.reduced, Y_SIZE)
+    cholesky(step.reduced, step.d_y.shape[0])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _right_hand_side(
     point: Point,
     model: Model,
@@ -205,13 +204,13 @@ def _right_hand_side(
     n_rows: int,
     n_cones: int,
     target: float,
-    corrector: bool,
     tau_free: bool,
 ) -> None:
     """Fill the right-hand sides; d_thrust holds H^-1 q of each node on return.
 
-    The predictor aims at zero complementarity without the second-order term: its shift is -z.
+    The predictor has target 0 and no second-order term, so that its shift is -z.
     """
+    corrector = target > 0.0
     for a in range(Y_SIZE):
         step.rhs_y[a] = -step.y_residual[a]
     for i in range(n_rows):
@@ -264,7 +263,7 @@ def _right_hand_side(
         step.rhs_y[0] = 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _solve_dense(step: Step, n_rows: int) -> None:
     """Solve B dy - M dlambda = rhs_rows and H dy + B' dlambda = rhs_y."""
     cholesky_solve(step.schur, n_rows, step.rhs_rows)
@@ -273,7 +272,7 @@ def _solve_dense(step: Step, n_rows: int) -> None:
         for i in range(n_rows):
             total += step.coupling[i, a] * step.rhs_rows[i]
         step.d_y[a] = total
-    cholesky_solve(step.reduced, Y_SIZE, step.d_y)
+    cholesky_solve(step.reduced, step.d_y.shape[0], step.d_y)
     for i in range(n_rows):
         total = -step.rhs_rows[i]
         for a in range(Y_SIZE):
@@ -281,7 +280,7 @@ def _solve_dense(step: Step, n_rows: int) -> None:
         step.d_multiplier[i] = total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _recover_cones(point: Point, model: Model, step: Step, n_equal: int, n_rows: int, n_cones: int) -> float:
     """Directions of the cones on y and of the inequality rows; the longest step they allow."""
     longest = UNBOUNDED
@@ -310,7 +309,7 @@ def _recover_cones(point: Point, model: Model, step: Step, n_equal: int, n_rows:
     return longest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _recover_nodes(point: Point, model: Model, step: Step, n_rows: int) -> float:
     """Directions of the thrust nodes and their duals; the longest step they allow."""
     longest = UNBOUNDED
@@ -337,7 +336,7 @@ def _recover_nodes(point: Point, model: Model, step: Step, n_rows: int) -> float
     return longest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _direction(
     point: Point,
     model: Model,
@@ -346,11 +345,10 @@ def _direction(
     n_rows: int,
     n_cones: int,
     target: float,
-    corrector: bool,
     tau_free: bool,
 ) -> float:
     """Solve the Newton system for one right-hand side; return the longest feasible step."""
-    _right_hand_side(point, model, step, n_equal, n_rows, n_cones, target, corrector, tau_free)
+    _right_hand_side(point, model, step, n_equal, n_rows, n_cones, target, tau_free)
     _solve_dense(step, n_rows)
     return min(
         _recover_cones(point, model, step, n_equal, n_rows, n_cones),
@@ -358,7 +356,7 @@ def _direction(
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def advance(
     point: Point,
     model: Model,
@@ -379,9 +377,9 @@ def advance(
     """
     degree = point.thrust.shape[0] + n_cones + n_rows - n_equal
     factorise(point, model, step, n_equal, n_rows, n_cones, tau_free)
-    affine = min(1.0, _direction(point, model, step, n_equal, n_rows, n_cones, 0.0, False, tau_free))
+    affine = min(1.0, _direction(point, model, step, n_equal, n_rows, n_cones, 0.0, tau_free))
     target = max((1.0 - affine) ** 3 * gap / degree, smallest_target)
-    longest = _direction(point, model, step, n_equal, n_rows, n_cones, target, True, tau_free)
+    longest = _direction(point, model, step, n_equal, n_rows, n_cones, target, tau_free)
     length = min(1.0, FRACTION_TO_BOUNDARY * longest)
     for a in range(Y_SIZE):
         point.y[a] += length * step.d_y[a]

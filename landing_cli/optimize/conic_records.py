@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from landing_cli.kernel import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -70,7 +71,7 @@ class Step(NamedTuple):
     d_slack: Floats  # (R,)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def new_point(n_nodes: int, n_cones: int, n_rows: int) -> Point:
     """Return a zeroed iterate."""
     return Point(
@@ -84,7 +85,7 @@ def new_point(n_nodes: int, n_cones: int, n_rows: int) -> Point:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def new_model(n_nodes: int, n_cones: int, n_rows: int) -> Model:
     """Return a zeroed model."""
     return Model(
@@ -102,7 +103,7 @@ def new_model(n_nodes: int, n_cones: int, n_rows: int) -> Model:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def new_step(n_nodes: int, n_cones: int, n_rows: int) -> Step:
     """Return zeroed scratch space for an iteration."""
     return Step(

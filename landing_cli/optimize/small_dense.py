@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from landing_cli.kernel import kernel
 
 Floats = NDArray[np.float64]
 
 SMALLEST_PIVOT = 1e-40
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def cholesky(matrix: Floats, n: int) -> None:
     """Factor the leading n x n block in place: its lower triangle becomes L with L L' = matrix.
 
@@ -31,7 +32,7 @@ def cholesky(matrix: Floats, n: int) -> None:
         matrix[i, i] = math.sqrt(max(total, SMALLEST_PIVOT))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def cholesky_solve(factor: Floats, n: int, x: Floats) -> None:
     """Solve L L' x = x in place for the factor of :func:`cholesky`."""
     for i in range(n):

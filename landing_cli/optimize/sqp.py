@@ -16,9 +16,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from landing_cli.kernel import inlined, kernel
 from landing_cli.optimize.elastic_qp import new_elastic_qp, solve_elastic_qp
 
 Floats = NDArray[np.float64]
@@ -38,7 +38,7 @@ class LocalModel(NamedTuple):
     pooled: NDArray[np.bool_]  # (m,) no equality; their violation is that of the worst of them
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def new_local_model(n: int, m: int) -> LocalModel:
     """A zeroed model."""
     return LocalModel(
@@ -51,7 +51,7 @@ def new_local_model(n: int, m: int) -> LocalModel:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def violation(values: Floats, equality: NDArray[np.bool_], pooled: NDArray[np.bool_], m: int) -> float:
     """Violation of the first ``m`` rows: the sum of the rows' own, and the worst of the pool."""
     total, worst = 0.0, 0.0
@@ -65,7 +65,7 @@ def violation(values: Floats, equality: NDArray[np.bool_], pooled: NDArray[np.bo
     return total + worst
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def convexify(matrix: Floats) -> None:
     """Turn negative curvature into positive curvature of the same size, in place.
 
@@ -102,7 +102,7 @@ def convexify(matrix: Floats) -> None:
             matrix[a, b] = total
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _rotate(A: Floats, V: Floats, p: int, q: int) -> None:
     """Turn the plane of axes p and q so that A[p, q] vanishes; V collects the rotations."""
     theta = 0.5 * (A[q, q] - A[p, p]) / A[p, q]
@@ -121,7 +121,7 @@ def _rotate(A: Floats, V: Floats, p: int, q: int) -> None:
         V[k, p], V[k, q] = c * x - s * y, s * x + c * y
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def propose(
     model: LocalModel, m: int, price: float, radius: Floats, step: Floats, multipliers: Floats
 ) -> float:
@@ -190,7 +190,7 @@ def propose(
     return expected
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def add_secant(change: Floats, step: Floats, estimate: Floats) -> None:
     """Symmetric rank-one update, so that ``estimate`` maps ``step`` to ``change``."""
     n = step.shape[0]

@@ -19,12 +19,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.bounds import largest_acceleration_outside
 from landing_cli.body.gravity.field_values import accelerations
+from landing_cli.kernel import kernel
 from landing_cli.optimize.conic_records import Model, Point
 from landing_cli.reach.descent_model import Layout
 from landing_cli.reach.scaled_case import ScaledCase, gravity_on_arc
@@ -74,7 +74,7 @@ def gravity_tube(scaled: ScaledCase, bounds: GravityBounds) -> Floats:
     return outside[np.maximum(shell, 0)]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _drift_work(case: ScaledCase, target: Floats, q: Floats, p: Floats) -> float:
     """-lambda' E for the drift without gravity: E_r = r_c - r0 - v0, E_v = w x r_c - v0."""
     r, v = case.position, case.velocity
@@ -84,7 +84,7 @@ def _drift_work(case: ScaledCase, target: Floats, q: Floats, p: Floats) -> float
     return total - case.spin * (p[1] * target[0] - p[0] * target[1])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _descent_integrals(case: ScaledCase, tube: Floats, q: Floats, p: Floats) -> tuple[float, float]:
     """Upper bounds of int |p + q s| / m and int |p + q s| gbar by the trapezoid rule."""
     n = tube.shape[0]
@@ -102,7 +102,7 @@ def _descent_integrals(case: ScaledCase, tube: Floats, q: Floats, p: Floats) -> 
     return by_thrust, by_gravity
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _dual_feasible(case: ScaledCase, model: Model, multiplier: Floats, n_rows: int, duals: Floats) -> None:
     """Make ``duals`` satisfy sum_j A_j' z_j = A_y' lambda, by way of the balls at the arc's two ends."""
     arcs = case.arc_fractions.shape[0]
@@ -132,7 +132,7 @@ def _dual_feasible(case: ScaledCase, model: Model, multiplier: Floats, n_rows: i
         z[0] = math.sqrt(z[1] * z[1] + z[2] * z[2] + z[3] * z[3])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def certified_thrust_level(
     case: ScaledCase,
     target: Floats,
@@ -170,7 +170,7 @@ def certified_thrust_level(
     """
     q, p = multiplier[0:3], multiplier[3:6]
     duals[:, :] = cone_dual
-    _dual_feasible(case, model, multiplier, 6, duals)
+    _dual_feasible(case, model, multiplier, q.shape[0] + p.shape[0], duals)
     by_thrust, by_gravity = _descent_integrals(case, tube, q, p)
     work = _drift_work(case, target, q, p) - by_gravity
     W2 = case.spin * case.spin
@@ -191,7 +191,7 @@ def certified_thrust_level(
     return work / by_thrust
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def linearised_thrust_level(
     case: ScaledCase, plan: Layout, point: Point, model: Model, duals: Floats
 ) -> float:

@@ -13,11 +13,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.body.gravity.kernels import acceleration_and_gradient, curvature
 from landing_cli.flight.extremal import ExtremalScale, rates_in_gravity, thrust_ratio
+from landing_cli.kernel import inlined, kernel
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Field(NamedTuple):
     inverse_axes: Floats  # (3,) of the keep-out ellipsoid, scaled
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def new_extremal(n_steps: int) -> Extremal:
     """Room for an extremal of ``n_steps`` steps before splitting."""
     size = n_steps + MAX_SPLITS
@@ -61,7 +61,7 @@ def new_extremal(n_steps: int) -> Extremal:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def gravity_point(field: Field, y: Floats) -> tuple[float, float, float]:
     """Where gravity is evaluated, m: the position, or its projection out of the ellipsoid's core."""
     w = field.inverse_axes
@@ -72,7 +72,7 @@ def gravity_point(field: Field, y: Floats) -> tuple[float, float, float]:
     return scale * y[0], scale * y[1], scale * y[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _rates(field: Field, saturated: bool, y: Floats, out: Floats) -> None:
     """Rates of state, costates and energy."""
     x, yy, z = gravity_point(field, y)
@@ -82,7 +82,7 @@ def _rates(field: Field, saturated: bool, y: Floats, out: Floats) -> None:
     out[14] = 0.5 * u * u
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _step(
     field: Field, saturated: bool, h: float, y: Floats, rate: Floats, stage: Floats, out: Floats
 ) -> float:
@@ -102,7 +102,7 @@ def _step(
     return middle
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _step_to_switch(
     field: Field, saturated: bool, upper: float, y: Floats, rate: Floats, stage: Floats, out: Floats
 ) -> float:
@@ -131,7 +131,7 @@ def _step_to_switch(
     return h
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fly_extremal(field: Field, n_steps: int, extremal: Extremal) -> int:
     """Integrate from ``extremal.state[0]`` over unit time.
 
@@ -180,7 +180,7 @@ def fly_extremal(field: Field, n_steps: int, extremal: Extremal) -> int:
     return k
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _share_to_turn(w: float, y: Floats, left: float, smallest: float) -> float:
     """Halve what is left to the next node until lambda_v turns little within it."""
     dx, dy, dz = -y[7] + 2.0 * w * y[11], -y[8] - 2.0 * w * y[10], -y[9]
@@ -196,7 +196,7 @@ def _share_to_turn(w: float, y: Floats, left: float, smallest: float) -> float:
     return part
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _tangent_rates(field: Field, saturated: bool, y: Floats, X: Floats, rate: Floats, D: Floats) -> None:
     """Rates of state and energy (as ``_rates``) and of all tangent columns, (15, 8) each."""
     scale = field.scale
@@ -241,7 +241,7 @@ def _tangent_rates(field: Field, saturated: bool, y: Floats, X: Floats, rate: Fl
         D[14, j] = u * du
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def tangents(field: Field, extremal: Extremal, n: int, X: Floats, node_tangents: Floats) -> None:
     """Derivatives of a flown extremal with respect to its initial costates.
 
@@ -280,7 +280,7 @@ def tangents(field: Field, extremal: Extremal, n: int, X: Floats, node_tangents:
         _keep_node(X, node_tangents[k + 1])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _keep_node(X: Floats, node: Floats) -> None:
     """Copy the derivatives of position and velocity."""
     for i in range(6):
@@ -288,7 +288,7 @@ def _keep_node(X: Floats, node: Floats) -> None:
             node[i, j] = X[i, j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _tangent_step(
     field: Field,
     saturated: bool,
@@ -320,7 +320,7 @@ def _tangent_step(
             S[i, 7] += part * rate[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _answer_of_switch(flow: float, y: Floats, X: Floats, d_left: Floats) -> None:
     """Let the step's length answer, so that u stays 1 at its end."""
     _, norm = thrust_ratio(flow, False, y)

@@ -11,11 +11,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import path_clearance
+from landing_cli.kernel import kernel
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
 from landing_cli.reach.scaled_case import ScaledCase, least_between
 from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
@@ -66,7 +66,7 @@ def new_deliveries(size: int) -> Deliveries:
     return Deliveries(np.full((size, len(VALUE_COLUMNS)), np.nan), np.full((size, 7), np.nan))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _to_body(case: ScaledCase, samples: Floats, path_m: Floats) -> float:
     """Fill body-frame positions, m; return the least r' Re r - 1 of the descent."""
     steps = samples.shape[0] - 1
@@ -93,7 +93,7 @@ def _to_body(case: ScaledCase, samples: Floats, path_m: Floats) -> float:
     return least
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def deliver(
     case: ScaledCase,
     frame: Frame,
@@ -176,7 +176,7 @@ def deliver(
     values[9] = excess if excess > LIMIT_TOLERANCE else 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def deliver_many(
     case: ScaledCase,
     frame: Frame,

@@ -22,9 +22,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from landing_cli.kernel import kernel
 from landing_cli.optimize.conic_ipm import fill_row_pull
 from landing_cli.optimize.conic_records import Model, Point
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal, gravity_on_arc
@@ -55,13 +55,13 @@ class Layout(NamedTuple):
     level: float  # |xi| that the cuts keep (1 plus a margin for the path between nodes)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def new_cuts(size: int) -> Cuts:
     """Room for ``size`` cuts."""
     return Cuts(np.zeros(size, dtype=np.int64), np.zeros((size, 3)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def layout(case: ScaledCase, n_cuts: int, energy_weight: float, tau_free: bool, level: float) -> Layout:
     """Count rows and cones for a case with ``n_cuts`` tangent planes."""
     n_equal = 7 if case.on_ellipsoid else 6
@@ -70,7 +70,7 @@ def layout(case: ScaledCase, n_cuts: int, energy_weight: float, tau_free: bool, 
     return Layout(n_equal, n_cuts, n_rows, n_cones, energy_weight, tau_free, level)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def arc_weights(sigma: float, final_time: float) -> tuple[float, float, float, float, float, float]:
     """Weights of (a_e, a_s) in a*, in r - r_c, and in v at time-to-go sigma T.
 
@@ -89,7 +89,7 @@ def arc_weights(sigma: float, final_time: float) -> tuple[float, float, float, f
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fill_handover_rows(case: ScaledCase, model: Model) -> None:
     """Constant derivatives of the six matching rows with respect to y."""
     spin = case.spin
@@ -107,7 +107,7 @@ def fill_handover_rows(case: ScaledCase, model: Model) -> None:
     model.row_y[4, 4] -= spin * r_s
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fill_arc_cones(case: ScaledCase, model: Model) -> None:
     """Constant derivatives of the final stage's thrust with respect to (a_e, a_s).
 
@@ -130,7 +130,7 @@ def fill_arc_cones(case: ScaledCase, model: Model) -> None:
                 A[2, c] += 2.0 * spin * v
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fill_glide_cones(case: ScaledCase, normal: Floats, model: Model) -> None:
     """Glide slope at handover (2 a_e + a_s) and at touchdown (a_e), about the facet normal."""
     first = case.arc_fractions.shape[0]
@@ -158,7 +158,7 @@ def fill_glide_cones(case: ScaledCase, normal: Floats, model: Model) -> None:
                     A[i, 1 + c] = scale * frame[i][c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fill_energy(case: ScaledCase, rho: float, model: Model) -> None:
     """Hessian of rho J in y: J2 = T/6 (|a_e|^2 + a_e . a_s + |a_s|^2)."""
     weight = rho * case.final_time / 6.0
@@ -168,7 +168,7 @@ def fill_energy(case: ScaledCase, rho: float, model: Model) -> None:
         model.y_hessian[1 + i, 4 + i] = model.y_hessian[4 + i, 1 + i] = weight
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def handover_point(case: ScaledCase, target: Floats, y: Floats) -> tuple[float, float, float]:
     """Handover position of the final arc, solver axes."""
     _, _, r_e, r_s, _, _ = arc_weights(1.0, case.final_time)
@@ -179,7 +179,7 @@ def handover_point(case: ScaledCase, target: Floats, y: Floats) -> tuple[float, 
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def refresh_arc(case: ScaledCase, target: Floats, handover_mass: float, model: Model, y: Floats) -> float:
     """Gravity and mass along the final arc; returns the mass at touchdown.
 
@@ -216,7 +216,7 @@ def refresh_arc(case: ScaledCase, target: Floats, handover_mass: float, model: M
     return mass
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _refresh_matching(case: ScaledCase, target: Floats, path: Path, model: Model, y: Floats) -> None:
     """Values and thrust derivatives of the six matching rows."""
     n = path.gradient.shape[0]
@@ -237,7 +237,7 @@ def _refresh_matching(case: ScaledCase, target: Floats, path: Path, model: Model
         model.row_end[r] = n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _refresh_handover_on_ellipsoid(case: ScaledCase, target: Floats, model: Model, point: Point) -> None:
     """Row 6: the handover on the ellipsoid, |xi(r_p)| = 1, linearised in y.
 
@@ -264,7 +264,7 @@ def _refresh_handover_on_ellipsoid(case: ScaledCase, target: Floats, model: Mode
                     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _refresh_approach(case: ScaledCase, target: Floats, model: Model, y: Floats, r: int) -> None:
     """Row r: an ellipsoid is reached from outside, -n . v_p >= 0, in the rotating frame.
 
@@ -287,7 +287,7 @@ def _refresh_approach(case: ScaledCase, target: Floats, model: Model, y: Floats,
         model.row_value[r] -= normal[i] * (v_e * y[1 + i] + v_s * y[4 + i])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _refresh_cuts(
     case: ScaledCase, path: Path, model: Model, cuts: Cuts, plan: Layout, retake: float
 ) -> None:
@@ -303,7 +303,7 @@ def _refresh_cuts(
         pull_back(path, k, n[0], n[1], n[2], 0.0, 0.0, 0.0, model.row_thrust[r])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _refresh_propellant(
     case: ScaledCase, point: Point, path: Path, model: Model, r: int, touchdown_mass: float
 ) -> None:
@@ -336,7 +336,7 @@ def _refresh_propellant(
             model.row_y[r, a] -= flow * touchdown_mass * case.final_time * width * along
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _add_mass_gradient(case: ScaledCase, point: Point, path: Path, model: Model) -> float:
     """Gradient through the mass: -c h lambda_m F / |F|, the mass costate carried back from the handover.
 
@@ -360,7 +360,7 @@ def _add_mass_gradient(case: ScaledCase, point: Point, path: Path, model: Model)
     return costate
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def refresh(
     case: ScaledCase,
     target: Floats,

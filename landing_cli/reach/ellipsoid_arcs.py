@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from landing_cli.kernel import kernel
 from landing_cli.reach.free_batch import CutBatch
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level, least_between
 from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
@@ -25,14 +25,14 @@ Ints = NDArray[np.int64]
 UNDECIDED = 0.1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def last_cut_node(case: ScaledCase, position: Floats) -> int:
     """Last node that may carry a tangent plane: the handover has a row of its own when on the ellipsoid."""
     n = position.shape[0] - 1
     return n - 1 if case.on_ellipsoid else n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def lowest_level(case: ScaledCase, position: Floats) -> float:
     """Least |xi| over the nodes of a path that may carry a tangent plane."""
     lowest = 1e9
@@ -42,7 +42,7 @@ def lowest_level(case: ScaledCase, position: Floats) -> float:
     return lowest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def lowest_level_between(case: ScaledCase, thrust: Floats, samples: Floats) -> float:
     """Least |xi| of an accurate flight of ``thrust``, between the nodes too; fills ``samples``.
 
@@ -65,7 +65,7 @@ def lowest_level_between(case: ScaledCase, thrust: Floats, samples: Floats) -> f
     return lowest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _unit_coordinates(case: ScaledCase, k: int, x: Floats, xi: Floats) -> None:
     """Xi of a solver-axes position at node k."""
     c, s = case.node_cos[k], case.node_sin[k]
@@ -74,7 +74,7 @@ def _unit_coordinates(case: ScaledCase, k: int, x: Floats, xi: Floats) -> None:
     xi[2] = x[2] * case.inverse_axes[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _plane_normal(case: ScaledCase, k: int, u: Floats, normal: Floats) -> None:
     """Normal, in solver axes, of the plane that touches the ellipsoid where xi = u at node k."""
     c, s = case.node_cos[k], case.node_sin[k]
@@ -82,7 +82,7 @@ def _plane_normal(case: ScaledCase, k: int, u: Floats, normal: Floats) -> None:
     normal[0], normal[1], normal[2] = c * a - s * b, s * a + c * b, u[2] * case.inverse_axes[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _dip(case: ScaledCase, position: Floats) -> tuple[int, int, int]:
     """Nodes before the entry, after the exit, and at the deepest point of a path's dip."""
     n = last_cut_node(case, position)
@@ -97,7 +97,7 @@ def _dip(case: ScaledCase, position: Floats) -> tuple[int, int, int]:
     return max(1, first - 1), min(n, last + 1), deepest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def arc_cuts(case: ScaledCase, position: Floats, side: float, node: Ints, normal: Floats) -> int:
     """Fill tangent planes along an arc around the ellipsoid; return their number.
 
@@ -141,7 +141,7 @@ def arc_cuts(case: ScaledCase, position: Floats, side: float, node: Ints, normal
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def freeze_on_path(
     case: ScaledCase, position: Floats, node: Ints, normal: Floats, count: int, level: float
 ) -> int:
@@ -163,14 +163,14 @@ def freeze_on_path(
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def lowest_levels(case: ScaledCase, positions: Floats, out: Floats) -> None:
     """Fill (n,) least |xi| over the nodes of (n, N + 1, 3) paths."""
     for i in range(positions.shape[0]):
         out[i] = lowest_level(case, positions[i])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def lowest_levels_between(case: ScaledCase, thrusts: Floats, out: Floats) -> None:
     """Fill (n,) least |xi| of accurate flights of (n, N, 3) thrusts, between the nodes too."""
     samples = np.empty((thrusts.shape[1] * SUBSTEPS + 1, 7))
@@ -178,14 +178,14 @@ def lowest_levels_between(case: ScaledCase, thrusts: Floats, out: Floats) -> Non
         out[i] = lowest_level_between(case, thrusts[i], samples)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def arc_cuts_many(case: ScaledCase, positions: Floats, side: float, cuts: CutBatch) -> None:
     """Fill the planes of a batch along arcs on one side of the ellipsoid; see :func:`arc_cuts`."""
     for i in range(positions.shape[0]):
         cuts.planes[i] = arc_cuts(case, positions[i], side, cuts.node[i], cuts.normal[i])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def freeze_many(case: ScaledCase, positions: Floats, levels: Floats, cuts: CutBatch) -> None:
     """Move the planes of a batch to its paths; see :func:`freeze_on_path`."""
     for i in range(positions.shape[0]):

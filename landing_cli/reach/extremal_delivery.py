@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import path_clearance
 from landing_cli.flight.extremal import thrust_ratio
+from landing_cli.kernel import inlined, kernel
 from landing_cli.reach.costate_dynamics import MAX_SPLITS, fly_extremal
 from landing_cli.reach.delivery import LIMIT_TOLERANCE, Deliveries, Frame
 from landing_cli.reach.ellipsoid_dips import LEVEL, find_dips
@@ -21,7 +21,7 @@ from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
 Floats = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _measure_descent(
     problem: ExtremalProblem, flight: Flight, steps: int, path_m: Floats
 ) -> tuple[float, float]:
@@ -41,7 +41,7 @@ def _measure_descent(
     return level2 - 1.0, peak
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _deliver(
     problem: ExtremalProblem,
     frame: Frame,
@@ -95,7 +95,7 @@ def _deliver(
     values[9] = excess if excess > LIMIT_TOLERANCE else 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def deliver_extremals(
     problem: ExtremalProblem,
     frame: Frame,

@@ -14,10 +14,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.flight.extremal import thrust_ratio
+from landing_cli.kernel import inlined, kernel
 from landing_cli.reach.delivery import VALUE_COLUMNS, new_deliveries
 from landing_cli.reach.extremal_delivery import deliver_extremals
 from landing_cli.reach.extremal_facet import (
@@ -107,7 +107,7 @@ def approximate_costates(case: LandingCase, targets_m: Floats) -> Floats:
     return np.concatenate([of_position, of_velocity, of_mass[:, None]], axis=1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _pressures(
     problem: ExtremalProblem, target: Floats, flight: Flight, multipliers: Floats, out: Floats
 ) -> None:
@@ -142,7 +142,7 @@ def _pressures(
         out[_ELLIPSOID] += multipliers[r]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _least_ratio(flow: float, flight: Flight) -> float:
     """Least thrust that the costates ask for along an extremal; above 1 it is at its bound throughout."""
     extremal = flight.extremal
@@ -155,7 +155,7 @@ def _least_ratio(flow: float, flight: Flight) -> float:
     return least
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _is_better(ended: Ended, status: int, energy: float, broken: float) -> bool:
     """Whether a search ended better than the best before it."""
     if ended.status == OPTIMAL and status == OPTIMAL:
@@ -163,7 +163,7 @@ def _is_better(ended: Ended, status: int, energy: float, broken: float) -> bool:
     return ended.status == OPTIMAL or (status != OPTIMAL and ended.broken < broken)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def search_batch(
     problem: ExtremalProblem,
     targets: Floats,

@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from landing_cli.kernel import inlined, kernel
 from landing_cli.optimize.sqp import (
     LocalModel,
     add_secant,
@@ -99,13 +99,13 @@ class Ended(NamedTuple):
     broken: float
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def new_flight(n_steps: int) -> Flight:
     """Room for one extremal."""
     return Flight(new_extremal(n_steps), new_dips(), np.zeros(MAX_ROWS))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def new_search(problem: ExtremalProblem, n_steps: int) -> Search:
     """Work space for the facets of one case, flown with ``n_steps`` steps."""
     model = new_local_model(N, MAX_ROWS)
@@ -124,7 +124,7 @@ def new_search(problem: ExtremalProblem, n_steps: int) -> Search:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def start_extremal(problem: ExtremalProblem, costates: Floats, extremal: Extremal) -> None:
     """Set the initial state and costates."""
     y = extremal.state[0]
@@ -135,7 +135,7 @@ def start_extremal(problem: ExtremalProblem, costates: Floats, extremal: Extrema
         y[7 + i] = costates[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _try(
     problem: ExtremalProblem, target: Floats, normal: Floats, costates: Floats, flight: Flight, search: Search
 ) -> Trial:
@@ -154,7 +154,7 @@ def _try(
     return Trial(k, rows, energy, broken)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _differentiate(
     problem: ExtremalProblem, target: Floats, normal: Floats, flight: Flight, trial: Trial, search: Search
 ) -> None:
@@ -203,7 +203,7 @@ def _differentiate(
         )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _renew_model(
     problem: ExtremalProblem,
     target: Floats,
@@ -239,7 +239,7 @@ def _renew_model(
     convexify(model.hessian)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _correct(flight: Flight, rows: int, price: float, search: Search, step: Floats) -> None:
     """Second-order correction: aim again, from what the rows turned out to be after the step."""
     model, kept = search.model, np.zeros(rows)
@@ -252,7 +252,7 @@ def _correct(flight: Flight, rows: int, price: float, search: Search, step: Floa
         model.values[r] = kept[r]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _take_step(
     problem: ExtremalProblem,
     target: Floats,
@@ -294,7 +294,7 @@ def _take_step(
     return other, better, True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def search_extremal(
     problem: ExtremalProblem,
     target: Floats,

@@ -15,10 +15,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.body.gravity.kernels import acceleration
+from landing_cli.kernel import kernel
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class ArcMeasures(NamedTuple):
     glide_angle_rad: float  # largest angle of r - r_c to the facet normal
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def end_accelerations(
     rx: float, ry: float, rz: float, vx: float, vy: float, vz: float, duration_s: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -57,7 +57,7 @@ def end_accelerations(
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def arc_state(
     a: tuple[float, float, float, float, float, float], target: Floats, duration_s: float, s: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -80,14 +80,14 @@ def arc_state(
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _angle(x: float, y: float, z: float, normal: Floats) -> float:
     along = x * normal[0] + y * normal[1] + z * normal[2]
     square = x * x + y * y + z * z
     return math.atan2(math.sqrt(max(square - along * along, 0.0)), along)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def measure_arc(
     handover: Floats,
     handover_mass: float,

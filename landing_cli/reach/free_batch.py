@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from landing_cli.kernel import kernel
 from landing_cli.reach.descent_model import Layout, layout
 from landing_cli.reach.free_solve import CONVERGED, Solver, new_solver, solve
 from landing_cli.reach.records import Binding
@@ -74,7 +74,7 @@ def no_cuts(size: int, intervals: int) -> CutBatch:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _keep_costates(case: ScaledCase, plan: Layout, solver: Solver, mass_costate: float, out: Floats) -> None:
     """Carry the multipliers back to the start and turn them into the rotating frame.
 
@@ -108,7 +108,7 @@ def _keep_costates(case: ScaledCase, plan: Layout, solver: Solver, mass_costate:
     out[6] = mass_costate
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _keep_pressure(case: ScaledCase, plan: Layout, solver: Solver, out: Floats) -> None:
     """What a relative loosening of each constraint takes off the objective (envelope theorem)."""
     point = solver.point
@@ -128,7 +128,7 @@ def _keep_pressure(case: ScaledCase, plan: Layout, solver: Solver, out: Floats) 
         out[PROPELLANT] = -point.multiplier[plan.n_rows - 1] * case.propellant
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def solve_many(
     case: ScaledCase,
     targets: Floats,

@@ -10,9 +10,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from landing_cli.kernel import kernel
 from landing_cli.optimize.conic_ipm import advance, residuals
 from landing_cli.optimize.conic_records import Model, Point, Step, new_model, new_point, new_step
 from landing_cli.reach.certificate import certified_thrust_level, linearised_thrust_level
@@ -63,7 +63,7 @@ class Outcome(NamedTuple):
     mass_costate: float  # at the start
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def new_solver(case: ScaledCase) -> Solver:
     """Allocate a solver for a scaled case."""
     n = case.mid_cos.shape[0]
@@ -79,7 +79,7 @@ def new_solver(case: ScaledCase) -> Solver:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _start_thrust(case: ScaledCase, target: Floats, normal: Floats, solver: Solver) -> None:
     """Least-energy thrust to a plausible handover, from the unpowered flight's miss, clipped.
 
@@ -113,7 +113,7 @@ def _start_thrust(case: ScaledCase, target: Floats, normal: Floats, solver: Solv
                 F[i] *= 0.7 / norm
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def cold_start(case: ScaledCase, target: Floats, normal: Floats, plan: Layout, solver: Solver) -> None:
     """Set the iterate to a well-centred point; the objective's scale sets the duals."""
     point, model = solver.point, solver.model
@@ -146,7 +146,7 @@ def cold_start(case: ScaledCase, target: Floats, normal: Floats, plan: Layout, s
         point.cone_dual[j, 0] = 0.1 * scale
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def solve(
     case: ScaledCase,
     target: Floats,

@@ -11,10 +11,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from landing_cli.body.gravity.kernels import acceleration, acceleration_and_gradient
+from landing_cli.kernel import kernel
 from landing_cli.reach.records import LandingCase
 
 Floats = NDArray[np.float64]
@@ -94,7 +94,7 @@ def scale_case(case: LandingCase, n_intervals: int) -> ScaledCase:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def core_scale(case: ScaledCase, x: float, y: float, z: float) -> float:
     """Metres per unit of length, more where a body-frame point lies in the ellipsoid's core."""
     a, b, c = x * case.inverse_axes[0], y * case.inverse_axes[1], z * case.inverse_axes[2]
@@ -104,7 +104,7 @@ def core_scale(case: ScaledCase, x: float, y: float, z: float) -> float:
     return case.length_m * CORE / math.sqrt(level + 1e-30)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def gravity_and_gradient(
     case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
@@ -135,7 +135,7 @@ def gravity_and_gradient(
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def gravity_at_angle(
     case: ScaledCase, angle: float, x: float, y: float, z: float
 ) -> tuple[float, float, float]:
@@ -148,7 +148,7 @@ def gravity_at_angle(
     return p * (cosine * ax - sine * ay), p * (sine * ax + cosine * ay), p * az
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def gravity_on_arc(case: ScaledCase, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Gravity at a point of the final arc, scaled, body axes; arcs may fly deep in the ellipsoid."""
     L, p = case.length_m, 1.0 / case.acceleration_m_s2
@@ -156,7 +156,7 @@ def gravity_on_arc(case: ScaledCase, x: float, y: float, z: float) -> tuple[floa
     return p * ax, p * ay, p * az
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def ellipsoid_level(case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float) -> float:
     """|xi| = sqrt(r' Re r) of a point in solver axes: 1 on the ellipsoid, homogeneous of degree 1."""
     a = (cosine * x + sine * y) * case.inverse_axes[0]
@@ -165,7 +165,7 @@ def ellipsoid_level(case: ScaledCase, cosine: float, sine: float, x: float, y: f
     return math.sqrt(a * a + b * b + c * c)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def least_between(first: float, middle: float, last: float) -> float:
     """Least value of the parabola through three evenly spaced values, between the outer two."""
     slope, bend = 0.5 * (last - first), 0.5 * (first + last) - middle
@@ -174,7 +174,7 @@ def least_between(first: float, middle: float, last: float) -> float:
     return min(first, middle, last)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def ellipsoid_normal(
     case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float
 ) -> tuple[float, float, float]:

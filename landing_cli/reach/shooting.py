@@ -11,9 +11,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from landing_cli.kernel import kernel
 from landing_cli.reach.scaled_case import ScaledCase, gravity_and_gradient, gravity_at_angle
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,7 @@ class Path(NamedTuple):
     samples: Floats  # (N + 1, 7) scratch space of the accurate flight
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def new_path(n_intervals: int) -> Path:
     """A zeroed path."""
     return Path(
@@ -46,7 +46,7 @@ def new_path(n_intervals: int) -> Path:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fly(case: ScaledCase, thrust: Floats, path: Path) -> None:
     """Fly the descent stage from the initial state under ``thrust`` (N, 3), filling ``path``."""
     n = thrust.shape[0]
@@ -89,7 +89,7 @@ def fly(case: ScaledCase, thrust: Floats, path: Path) -> None:
         path.velocity[n, i] += path.defect[3 + i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def pull_back(
     path: Path, end: int, p0: float, p1: float, p2: float, q0: float, q1: float, q2: float, row: Floats
 ) -> tuple[float, float, float, float, float, float]:
@@ -132,7 +132,7 @@ def pull_back(
     return p0, p1, p2, q0, q1, q2
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fly_accurately(case: ScaledCase, thrust: Floats, samples: Floats) -> None:
     """Fly the descent stage by Runge-Kutta 4, with exact mass, in the same number of steps an interval.
 
@@ -187,7 +187,7 @@ def fly_accurately(case: ScaledCase, thrust: Floats, samples: Floats) -> None:
             samples[row, :] = s
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def measure_defect(case: ScaledCase, thrust: Floats, path: Path) -> None:
     """Set ``path.defect`` to what an accurate flight of ``thrust`` adds to :func:`fly`'s end state."""
     n = thrust.shape[0]

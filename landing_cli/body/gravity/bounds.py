@@ -11,7 +11,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.body.gravity.checks import checked_number
@@ -20,6 +19,7 @@ from landing_cli.body.gravity.kernel_types import FloatArray, Vector
 from landing_cli.body.gravity.kernels import acceleration_and_gradient, curvature
 from landing_cli.body.gravity.polyhedron_records import recorded_corners
 from landing_cli.errors import InputRefused
+from landing_cli.kernel import kernel
 
 TOLERANCE = 0.005  # how far a bound may lie above the largest value met
 _SECOND_ORDER_MARGIN = 2.0  # covers the change of the second derivative within a patch
@@ -189,7 +189,7 @@ def _unit(vectors: FloatArray) -> FloatArray:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _stretch2(u: Vector, semi_axes: FloatArray) -> float:
     """Return the largest |D t|^2 over unit tangents t at u, D = diag(semi_axes).
 
@@ -202,7 +202,7 @@ def _stretch2(u: Vector, semi_axes: FloatArray) -> float:
     return half_trace + math.sqrt(max(half_trace * half_trace - determinant, 0.0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _fill_ceilings(
     kind: int,
     params: FloatArray,

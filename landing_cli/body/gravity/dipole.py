@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from landing_cli.body.gravity.checks import checked_gm, checked_number
 from landing_cli.body.gravity.field import GravityField, GravityKind
@@ -16,6 +15,7 @@ from landing_cli.body.gravity.point_mass import (
     point_curvature,
     point_potential,
 )
+from landing_cli.kernel import kernel
 
 
 def dipole_field(
@@ -54,14 +54,14 @@ def dipole_field(
     return GravityField(GravityKind.DIPOLE, params)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def dipole_potential(params: Params, x: float, y: float, z: float) -> float:
     """Return U of the two masses."""
     a = point_potential(params[0], x - params[1], y - params[2], z)
     return a + point_potential(params[3], x - params[4], y - params[5], z)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def dipole_acceleration(params: Params, x: float, y: float, z: float) -> Vector:
     """Return the gradient of U."""
     ax, ay, az = point_acceleration(params[0], x - params[1], y - params[2], z)
@@ -69,7 +69,7 @@ def dipole_acceleration(params: Params, x: float, y: float, z: float) -> Vector:
     return ax + bx, ay + by, az + bz
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def dipole_acceleration_and_gradient(params: Params, x: float, y: float, z: float) -> VectorAndSymmetric:
     """Return the gradient and the Hessian (xx, yy, zz, xy, xz, yz) of U."""
     a = point_acceleration_and_gradient(params[0], x - params[1], y - params[2], z)
@@ -87,7 +87,7 @@ def dipole_acceleration_and_gradient(params: Params, x: float, y: float, z: floa
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def dipole_curvature(
     params: Params, x: float, y: float, z: float, lx: float, ly: float, lz: float
 ) -> Symmetric:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.kernels import acceleration, gradient, potential
+from landing_cli.kernel import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -78,20 +78,20 @@ def _rows(points: ArrayLike) -> FloatArray:
     return np.array(points, dtype=np.float64, order="C").reshape(-1, 3)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _fill_potentials(kind: int, params: FloatArray, points: FloatArray, values: FloatArray) -> None:
     for i in range(len(points)):
         values[i] = potential(kind, params, points[i, 0], points[i, 1], points[i, 2])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _fill_accelerations(kind: int, params: FloatArray, points: FloatArray, values: FloatArray) -> None:
     for i in range(len(points)):
         gx, gy, gz = acceleration(kind, params, points[i, 0], points[i, 1], points[i, 2])
         values[i, 0], values[i, 1], values[i, 2] = gx, gy, gz
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _fill_gradients(kind: int, params: FloatArray, points: FloatArray, values: FloatArray) -> None:
     for i in range(len(points)):
         xx, yy, zz, xy, xz, yz = gradient(kind, params, points[i, 0], points[i, 1], points[i, 2])

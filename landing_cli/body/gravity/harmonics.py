@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from landing_cli.body.gravity.checks import checked_gm, checked_number
 from landing_cli.body.gravity.field import GravityField, GravityKind
@@ -23,6 +22,7 @@ from landing_cli.body.gravity.point_mass import (
     point_curvature,
     point_potential,
 )
+from landing_cli.kernel import kernel
 
 
 def harmonics_field(
@@ -63,7 +63,7 @@ def harmonics_field(
     return GravityField(GravityKind.HARMONICS, np.concatenate([[gm], gm * radius**2 * tensor]))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _times_q(params: Params, x: float, y: float, z: float) -> Vector:
     return (
         params[1] * x + params[4] * y + params[5] * z,
@@ -72,7 +72,7 @@ def _times_q(params: Params, x: float, y: float, z: float) -> Vector:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def harmonics_potential(params: Params, x: float, y: float, z: float) -> float:
     """Return U of the point mass and degree 2."""
     r2 = x * x + y * y + z * z
@@ -81,7 +81,7 @@ def harmonics_potential(params: Params, x: float, y: float, z: float) -> float:
     return point_potential(params[0], x, y, z) + q / (r2 * r2 * math.sqrt(r2))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def harmonics_acceleration(params: Params, x: float, y: float, z: float) -> Vector:
     """Return the gradient of U."""
     r2 = x * x + y * y + z * z
@@ -96,7 +96,7 @@ def harmonics_acceleration(params: Params, x: float, y: float, z: float) -> Vect
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def harmonics_acceleration_and_gradient(params: Params, x: float, y: float, z: float) -> VectorAndSymmetric:
     """Return the gradient and the Hessian (xx, yy, zz, xy, xz, yz) of U."""
     r2 = x * x + y * y + z * z
@@ -120,7 +120,7 @@ def harmonics_acceleration_and_gradient(params: Params, x: float, y: float, z: f
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def harmonics_curvature(
     params: Params, x: float, y: float, z: float, lx: float, ly: float, lz: float
 ) -> Symmetric:

@@ -7,8 +7,6 @@ ordered xx, yy, zz, xy, xz, yz. Nothing is allocated, and a position at a singul
 
 from __future__ import annotations
 
-from numba import njit
-
 from landing_cli.body.gravity.dipole import (
     dipole_acceleration,
     dipole_acceleration_and_gradient,
@@ -35,13 +33,14 @@ from landing_cli.body.gravity.polyhedron import (
     polyhedron_curvature,
     polyhedron_potential,
 )
+from landing_cli.kernel import kernel
 
 _POINT_MASS = int(GravityKind.POINT_MASS)
 _HARMONICS = int(GravityKind.HARMONICS)
 _DIPOLE = int(GravityKind.DIPOLE)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def potential(kind: int, params: Params, x: float, y: float, z: float) -> float:
     """Return the potential U, m2/s2, positive (GM/r + ...)."""
     if kind == _POINT_MASS:
@@ -53,7 +52,7 @@ def potential(kind: int, params: Params, x: float, y: float, z: float) -> float:
     return polyhedron_potential(params, x, y, z)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def acceleration(kind: int, params: Params, x: float, y: float, z: float) -> Vector:
     """Return the acceleration (gx, gy, gz), m/s2: the gradient of U."""
     if kind == _POINT_MASS:
@@ -65,7 +64,7 @@ def acceleration(kind: int, params: Params, x: float, y: float, z: float) -> Vec
     return polyhedron_acceleration(params, x, y, z)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def acceleration_and_gradient(kind: int, params: Params, x: float, y: float, z: float) -> VectorAndSymmetric:
     """Return the acceleration, m/s2, then its gradient, 1/s2: nine numbers that share their work."""
     if kind == _POINT_MASS:
@@ -77,14 +76,14 @@ def acceleration_and_gradient(kind: int, params: Params, x: float, y: float, z: 
     return polyhedron_acceleration_and_gradient(params, x, y, z)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def gradient(kind: int, params: Params, x: float, y: float, z: float) -> Symmetric:
     """Return the acceleration's gradient (gxx, gyy, gzz, gxy, gxz, gyz), 1/s2: the Hessian of U."""
     g = acceleration_and_gradient(kind, params, x, y, z)
     return g[3], g[4], g[5], g[6], g[7], g[8]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def curvature(
     kind: int, params: Params, x: float, y: float, z: float, lx: float, ly: float, lz: float
 ) -> Symmetric:
