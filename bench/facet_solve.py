@@ -4,6 +4,8 @@
 ``--list`` adds every facet. The rows:
 
 - ours: ``landing_cli.reach.free_descent.solve_prepared``, prepared and compiled beforehand;
+- ours, extremals: the paper's family, ``extremal_descent.solve_from``, on top of the row above, whose
+  multipliers it starts from;
 - slsqp costates: scipy's SLSQP over the paper's 7 costates, compiled RK4, finite differences by scipy;
 - same, compiled differences: the differences in one compiled loop, the best a user could do;
 - slsqp nodes: 20 thrust vectors instead of costates, so that the control is free as ours is;
@@ -24,11 +26,13 @@ from pathlib import Path
 import numpy as np
 
 from bench import slsqp_baseline
+from bench.arithmetic import flops_of_iteration
 from bench.peak import measured_peak
 from landing_cli.body.gravity.coefficients import degree2_from_mesh
 from landing_cli.body.mesh import facet_centroids, facet_normals
-from landing_cli.reach.free_descent import prepare, solve_prepared, survey
-from landing_cli.reach.records import LandingCase, Verdict
+from landing_cli.reach import extremal_descent
+from landing_cli.reach.free_descent import INTERVALS, PreparedCase, prepare, solve_prepared, survey
+from landing_cli.reach.records import FacetSolutions, LandingCase, Verdict
 from landing_cli.scenario.build import build
 from landing_cli.scenario.load import load
 
@@ -81,15 +85,43 @@ def timed(method: str, facets: np.ndarray, solve: Callable[[int], tuple[bool, fl
     return Row(method, cpu_s, np.array([a[0] for a in answers]), np.array([a[1] for a in answers]))
 
 
-def ours(case: LandingCase, facets: np.ndarray) -> Row:
-    """The package's solver, on all facets in one call, the case prepared and the code compiled beforehand."""
-    prepared = prepare(case, survey(case))
-    solve_prepared(prepared, facets[:1])
-    begun = time.process_time()
-    rows = solve_prepared(prepared, facets).rows
-    cpu_s = (time.process_time() - begun) / len(facets)
+@dataclass(frozen=True)
+class Ours:
+    """Our solver on all facets in one call, the case prepared and the code compiled beforehand."""
+
+    prepared: PreparedCase
+    solutions: FacetSolutions
+    row: Row
+
+    @staticmethod
+    def of(case: LandingCase, facets: np.ndarray) -> Ours:
+        """Solve and time."""
+        prepared = prepare(case, survey(case))
+        solve_prepared(prepared, facets[:1])
+        begun = time.process_time()
+        solutions = solve_prepared(prepared, facets)
+        return Ours(prepared, solutions, row_of("ours", solutions, time.process_time() - begun))
+
+    def iterations(self) -> float:
+        """Interior-point iterations a facet, mean."""
+        return float(self.solutions.rows["iterations"].mean())
+
+
+def row_of(method: str, solutions: FacetSolutions, cpu_s: float) -> Row:
+    """A row of ours."""
+    rows = solutions.rows
     reachable = rows["verdict"] == Verdict.REACHABLE
-    return Row("ours", cpu_s, reachable, np.where(reachable, rows["performance_index_m2_s3"], np.nan))
+    j = np.where(reachable, rows["performance_index_m2_s3"], np.nan)
+    return Row(method, cpu_s / len(rows), reachable, j)
+
+
+def extremals(free: Ours) -> Row:
+    """The paper's family from the conic solve's multipliers, whose time comes on top."""
+    few = FacetSolutions(free.solutions.rows[:1], free.solutions.nodes_of(0))
+    extremal_descent.solve_from(free.prepared, few)
+    begun = time.process_time()
+    solutions = extremal_descent.solve_from(free.prepared, free.solutions)
+    return row_of("ours, extremals (on top)", solutions, time.process_time() - begun)
 
 
 def slsqp(case: LandingCase, facets: np.ndarray, unknowns: str, differencing: str, label: str) -> Row:
@@ -142,8 +174,10 @@ def ipopt(case: LandingCase, facets: np.ndarray) -> list[Row]:
 
 def compare(case: LandingCase, facets: np.ndarray) -> list[Row]:
     """Every method on the same facets."""
+    free = Ours.of(case, facets)
     return [
-        ours(case, facets),
+        free.row,
+        extremals(free),
         slsqp(case, facets, "costates", "scipy", "slsqp costates"),
         slsqp(case, facets, "costates", "compiled", "slsqp costates, compiled differences"),
         slsqp(case, facets, "nodes", "compiled", "slsqp nodes, compiled differences"),
@@ -186,9 +220,17 @@ def main() -> None:
         total = len(case.asteroid.mesh.faces)
         facets = np.unique(np.linspace(0, total - 1, options.facets).astype(np.int64))
         print_case(case, facets, compare(case, facets), options.list)
-        every = ours(case, np.arange(total))
-        share = every.reachable.sum() / total
-        print(f"ours over all {total} facets: {1e3 * every.cpu_s:.3f} ms CPU a facet, {share:.1%} reachable")
+        every = Ours.of(case, np.arange(total))
+        cpu_s, share = every.row.cpu_s, every.row.reachable.sum() / total
+        print(f"ours over all {total} facets: {1e3 * cpu_s:.3f} ms CPU a facet, {share:.1%} reachable")
+        flops = every.iterations() * flops_of_iteration(INTERVALS) / cpu_s
+        print(
+            f"{every.iterations():.1f} iterations a facet: at least {flops / 1e9:.1f} Gflop/s (planes and"
+            f" certificate not counted), {flops / scalar:.0%} of the scalar and {flops / vector:.0%} of the"
+            " vector peak"
+        )
+        both = extremals(every)
+        print(f"extremals over all facets, on top: {1e3 * both.cpu_s:.3f} ms CPU a facet")
         begun = time.process_time()
         prepare(case, survey(case))
         print(f"survey and preparation, once a case: {1e3 * (time.process_time() - begun):.0f} ms CPU")

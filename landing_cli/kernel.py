@@ -7,9 +7,12 @@ functions with one caller; long ones compile slower inlined.
 
 from __future__ import annotations
 
+from typing import Any
+
 from numba import njit
 
+_njit: Any = njit  # its stubs do not know every option
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
-kernel = njit(**_OPTIONS)
-inlined = njit(**_OPTIONS, inline="always")
+kernel = _njit(**_OPTIONS)
+inlined = _njit(**_OPTIONS, inline="always")

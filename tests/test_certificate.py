@@ -235,7 +235,6 @@ def test_bounds_of_gravity_hold_beyond_their_radii() -> None:
         assert size[far].max(initial=0.0) > 0.7 * bound or far.sum() < 300
 
 
-@pytest.mark.xfail(strict=True, reason="a facet may lie deeper below its corners than the margin allows for")
 def test_the_bound_on_arcs_holds_all_over_the_facets() -> None:
     body = asteroid(gravity=3.0)
     bounds = gravity_bounds(body, landing_case(body).ellipsoid_m)

@@ -263,7 +263,6 @@ def test_terrain_that_is_required_refuses_exactly_the_paths_that_cut_rock() -> N
     assert (require.rows["proved"][cut] == 0).all()
 
 
-@pytest.mark.xfail(strict=True, reason="the least thrust level says nothing where the propellant is short")
 def test_a_facet_that_only_the_propellant_keeps_away_is_called_unreachable() -> None:
     _, free = answered(tof_s=760.0)
     bound = float(np.quantile(free.rows["fuel_kg"][reachable(free)], 0.3))

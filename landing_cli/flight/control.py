@@ -28,7 +28,7 @@ FloatArray = NDArray[np.float64]
 
 # steps of the order-8 integrator: halving them moves a landing by less than 1e-8 m (tested)
 _STEPS_PER_NODE = 1
-_EXTREMAL_STEPS = 64
+_EXTREMAL_STEPS = 256
 _ARC_STEPS = 16
 _KINKS = 32
 

@@ -131,15 +131,16 @@ def _eliminate_nodes(point: Point, model: Model, step: Step, n_rows: int) -> Non
         w0, w1, w2, w3, ib = scaling_point(tau, F[0], F[1], F[2], z[0], z[1], z[2], z[3])
         w = step.node_scaling[k]
         w[0], w[1], w[2], w[3], w[4] = w0, w1, w2, w3, ib
-        norm2 = w1 * w1 + w2 * w2 + w3 * w3
-        diagonal = model.thrust_curvature[k] + ib
-        inverse = 1.0 / diagonal
-        f = 2.0 * ib / (diagonal + 2.0 * ib * norm2)
+        # w0^2 - |w1|^2 = 1 is used throughout: differences of squares would cancel near a small gap
+        stretch = w0 * w0 + w1 * w1 + w2 * w2 + w3 * w3
+        curvature = model.thrust_curvature[k]
+        inverse, stiff = 1.0 / (curvature + ib), curvature + ib * stretch
+        f = 2.0 * ib / stiff
         # column of tau in the node's block: h = -2 w0 w1 / beta^2, and H^-1 h = g w1
         h = -2.0 * ib * w0
-        g = inverse * (1.0 - f * norm2) * h
+        g = h / stiff
         step.node_inverse[k, 0], step.node_inverse[k, 1], step.node_inverse[k, 2] = inverse, f, h
-        step.reduced[0, 0] += ib * (2.0 * w0 * w0 - 1.0) - h * g * norm2
+        step.reduced[0, 0] += ib * (curvature * stretch + ib) / stiff
         for i in range(n_rows):
             if model.row_end[i] <= k:
                 continue

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.bounds import largest_acceleration_outside
-from landing_cli.body.gravity.field_values import accelerations
+from landing_cli.body.gravity.surface_bound import largest_acceleration_on_mesh
 from landing_cli.kernel import kernel
 from landing_cli.optimize.conic_records import Model, Point
 from landing_cli.reach.descent_model import Layout
@@ -46,12 +46,10 @@ class GravityBounds(NamedTuple):
 def gravity_bounds(asteroid: Asteroid, ellipsoid_m: Floats) -> GravityBounds:
     """Bound gravity outside the keep-out ellipsoid, by distance, and on the surface."""
     radii = np.min(ellipsoid_m) * np.geomspace(1.0, FARTHEST_SHELL, SHELLS)
-    at_vertices = np.linalg.norm(accelerations(asteroid.gravity, asteroid.mesh.vertices), axis=1)
     return GravityBounds(
         radii,
         largest_acceleration_outside(asteroid.gravity, radii, ellipsoid_m),
-        # |g| is largest on the surface, and a facet lies only a little below its corners
-        float(1.02 * at_vertices.max()),
+        largest_acceleration_on_mesh(asteroid.gravity, asteroid.mesh),
     )
 
 
@@ -204,9 +202,10 @@ def linearised_thrust_level(
     work = by_thrust = 0.0
     for r in range(plan.n_rows):
         value = model.row_value[r]
-        for a in range(1, 7):
+        for a in range(7):
             value -= model.row_y[r, a] * point.y[a]
         work += point.multiplier[r] * value
+        by_thrust -= point.multiplier[r] * model.row_y[r, 0]
     for k in range(point.thrust.shape[0]):
         pull, F = model.row_pull[k], point.thrust[k]
         work -= pull[0] * F[0] + pull[1] * F[1] + pull[2] * F[2]

@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 
 # Limits are met when no scaled violation exceeds this: the last digits of the solver's convergence.
 LIMIT_TOLERANCE = 1e-5
+# Terrain clearance is looked at along the path's chords this often, in mean edges.
+CLEARANCE_SPACING = 1.0 / 40.0
 
 
 class Frame(NamedTuple):
@@ -166,7 +168,9 @@ def deliver(
     fuel = frame.mass_kg - arc.touchdown_mass_kg
     excess = max(peak - 1.0, peak_final - 1.0, -margin, -glide, off_ellipsoid)
     excess = max(excess, (fuel - frame.propellant_kg) / frame.mass_kg)
-    clearance, _facet = path_clearance(surface, path_m, frame.clear_radius_m, 1e-3, np.inf)
+    clearance, _facet = path_clearance(
+        surface, path_m, frame.clear_radius_m, 1e-3, CLEARANCE_SPACING * frame.clear_radius_m
+    )
     handover[6] = handover_mass
     values[0] = energy * case.acceleration_m_s2**2 * frame.descent_s + arc.energy_m2_s3
     values[1] = frame.exhaust_velocity_m_s * math.log(frame.mass_kg / arc.touchdown_mass_kg)

@@ -34,6 +34,9 @@ Floats = NDArray[np.float64]
 
 # Below this thrust the direction of thrust is not used as a direction (derivatives of |F|).
 SMALL_THRUST = 1e-3
+# |F| is rounded off below this where propellant is counted: where it is scarce flights coast, and |F| has a
+# kink at 0. It counts coasting as so much thrust, on the safe side.
+COAST = 5e-3
 
 
 class Cuts(NamedTuple):
@@ -307,19 +310,27 @@ def _refresh_cuts(
 def _refresh_propellant(
     case: ScaledCase, point: Point, path: Path, model: Model, r: int, touchdown_mass: float
 ) -> None:
-    """Row r: propellant left, P - (1 - m_touchdown) >= 0, with an isotropic bound of its curvature."""
+    """Row r: propellant left, tau P - (1 - m_touchdown) >= 0, with an isotropic bound of its curvature.
+
+    The level tau scales what is granted, propellant like thrust, so that a least level exists for every
+    facet and is at most 1 exactly for those that can be reached.
+    """
     n = path.gradient.shape[0]
     h, flow = 1.0 / n, case.mass_flow
-    model.row_value[r] = case.propellant - (1.0 - touchdown_mass)
+    rounded = 0.0  # what the rounded cones of thrust burn more than the flight
     model.row_end[r] = n
     eta = -point.multiplier[r]
     for k in range(n):
         F = point.thrust[k]
-        norm = max(math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), SMALL_THRUST)
+        square = F[0] * F[0] + F[1] * F[1] + F[2] * F[2]
+        norm = math.sqrt(square + COAST * COAST)
+        rounded += flow * h * (norm - math.sqrt(square))
         for i in range(3):
             model.row_thrust[r, k, i] = -flow * h * F[i] / norm
-        model.thrust_curvature[k] += eta * flow * h / max(norm, 0.05)
+        model.thrust_curvature[k] += eta * flow * h / norm
+    model.row_value[r] = point.y[0] * case.propellant - (1.0 - touchdown_mass) - rounded
     model.row_y[r, :] = 0.0
+    model.row_y[r, 0] = case.propellant
     fractions = case.arc_fractions
     last = fractions.shape[0] - 1
     for j in range(last + 1):

@@ -12,13 +12,16 @@ from landing_cli.body.clearance import path_clearance
 from landing_cli.flight.extremal import thrust_ratio
 from landing_cli.kernel import inlined, kernel
 from landing_cli.reach.costate_dynamics import MAX_SPLITS, fly_extremal
-from landing_cli.reach.delivery import LIMIT_TOLERANCE, Deliveries, Frame
+from landing_cli.reach.delivery import CLEARANCE_SPACING, LIMIT_TOLERANCE, Deliveries, Frame
 from landing_cli.reach.ellipsoid_dips import LEVEL, find_dips
-from landing_cli.reach.extremal_facet import FINE_STEPS, Flight, new_flight, start_extremal
+from landing_cli.reach.extremal_facet import Flight, new_flight, start_extremal
 from landing_cli.reach.extremal_terms import ExtremalProblem
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
 
 Floats = NDArray[np.float64]
+
+# Finer than any search: two switches of the thrust within one step go unseen.
+DELIVERY_STEPS = 240
 
 
 @inlined
@@ -57,7 +60,7 @@ def _deliver(
     """Fly one facet's extremal at fine steps and measure it; see ``delivery.Deliveries``."""
     scale = problem.field.scale
     start_extremal(problem, costates, flight.extremal)
-    steps = fly_extremal(problem.field, FINE_STEPS, flight.extremal)
+    steps = fly_extremal(problem.field, DELIVERY_STEPS, flight.extremal)
     margin, peak = _measure_descent(problem, flight, steps, path_m)
     end = flight.extremal.state[steps]
     off_ellipsoid = 0.0
@@ -86,7 +89,9 @@ def _deliver(
     excess = max(peak - 1.0, peak_final - 1.0, -margin, -glide, off_ellipsoid)
     excess = max(excess, (fuel - frame.propellant_kg) / frame.mass_kg)
     path = path_m[: steps + 1 + ARC_SAMPLES]
-    clearance, _facet = path_clearance(surface, path, frame.clear_radius_m, 1e-3, np.inf)
+    clearance, _facet = path_clearance(
+        surface, path, frame.clear_radius_m, 1e-3, CLEARANCE_SPACING * frame.clear_radius_m
+    )
     values[0] = end[14] * scale.acceleration_m_s2**2 * scale.time_s + arc.energy_m2_s3
     values[1] = frame.exhaust_velocity_m_s * math.log(frame.mass_kg / arc.touchdown_mass_kg)
     values[2] = fuel
@@ -124,8 +129,8 @@ def deliver_extremals(
     out : Deliveries
         Filled.
     """
-    flight = new_flight(FINE_STEPS)
-    path_m = np.empty((FINE_STEPS + MAX_SPLITS + 1 + ARC_SAMPLES, 3))
+    flight = new_flight(DELIVERY_STEPS)
+    path_m = np.empty((DELIVERY_STEPS + MAX_SPLITS + 1 + ARC_SAMPLES, 3))
     for i in range(costates.shape[0]):
         _deliver(
             problem,

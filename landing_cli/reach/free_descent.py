@@ -20,8 +20,8 @@ from landing_cli.body.bvh import SurfaceIndex, build_surface_index
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.reach.certificate import GravityBounds, gravity_bounds, gravity_tube
 from landing_cli.reach.delivery import VALUE_COLUMNS, Deliveries, Frame, deliver_many, new_deliveries
-from landing_cli.reach.free_batch import Batch
-from landing_cli.reach.free_flights import Question, best_flights
+from landing_cli.reach.free_batch import PROPELLANT, THRUST, Batch
+from landing_cli.reach.free_flights import Question, best_flights, flights_near
 from landing_cli.reach.free_solve import CERTIFIED, CONVERGED, STALLED
 from landing_cli.reach.records import Binding, FacetSolutions, LandingCase, Verdict, blank_rows
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
@@ -35,7 +35,10 @@ FINE_INTERVALS = 100
 # A thrust level below this on the coarse grid may be below 1 on the fine one (its bias is a few 1e-3).
 DOUBTFUL_LEVEL = 1.006
 
-_VIOLATION = VALUE_COLUMNS.index("violation")
+_COST = "performance_index_m2_s3"
+_ENERGY, _VIOLATION = VALUE_COLUMNS.index(_COST), VALUE_COLUMNS.index("violation")
+# Flights at full thrust in this share of the coarse intervals switch in between: they want the finer grid.
+SATURATED_SHARE, FULL_THRUST = 0.75, 0.999
 # Shares of the thrust bound that the final stage is given in turn where it exceeded the bound by less.
 ARC_SHARES = (1.0 - 4e-5, 1.0 - 3e-4, 1.0 - 3e-3)
 # Relative to J, a constraint whose loosening would gain less than this does not bind.
@@ -171,10 +174,22 @@ def _by_margin(prepared: PreparedCase, work: Work, chosen: Ints) -> None:
     rows["proved"][chosen[short]] = flights.bound[short] > 1.0
     rows["violation"][chosen[short]] = flights.level[short] - 1.0
     by_ellipsoid = short & (around | (rows["binding"][chosen] == Binding.ELLIPSOID)) & (flights.bound <= 1.0)
-    rows["binding"][chosen[short]] = Binding.THRUST
-    rows["binding"][chosen[by_ellipsoid]] = Binding.ELLIPSOID
+    scarce = flights.pressure[:, PROPELLANT] > flights.pressure[:, THRUST]
+    rows["binding"][chosen[short]] = np.where(scarce[short], Binding.PROPELLANT, Binding.THRUST)
+    rows["binding"][chosen[by_ellipsoid & ~scarce]] = Binding.ELLIPSOID
     flights.status[short] = STALLED
     _deliver(prepared, work, chosen, flights)
+    _less_energy(prepared, work, chosen, flights)
+
+
+def _less_energy(prepared: PreparedCase, work: Work, chosen: Ints, flights: Batch) -> None:
+    """Where only the least thrust level led to a flight, ask for the least energy in its neighbourhood."""
+    found = np.flatnonzero(flights.status == CONVERGED)
+    if len(found) == 0:
+        return
+    nearby = flights_near(_ask(work, chosen[found], False), flights.position[found])
+    work.rows["iterations"][chosen[found]] += nearby.iterations
+    _deliver(prepared, work, chosen[found], nearby)
 
 
 def _ask(work: Work, chosen: Ints, tau_free: bool) -> Question:
@@ -218,8 +233,9 @@ def _deliver(prepared: PreparedCase, work: Work, chosen: Ints, flights: Batch) -
         prepared.shared.normals[facets],
         out,
     )
-    # a flight that breaks a limit does not take the place of one that keeps them all
-    better = (out.values[:, _VIOLATION] == 0.0) | (rows["verdict"][chosen[found]] != Verdict.REACHABLE)
+    # only a flight that keeps every limit, at less cost, takes the place of one that keeps them all
+    better = (out.values[:, _VIOLATION] == 0.0) & (out.values[:, _ENERGY] < rows[_COST][chosen[found]])
+    better |= rows["verdict"][chosen[found]] != Verdict.REACHABLE
     found, out = found[better], Deliveries(out.values[better], out.handover[better])
     places = chosen[found]
     work.thrust[places] = flights.thrust[found]
@@ -282,13 +298,27 @@ def solve_prepared(prepared: PreparedCase, facets: NDArray[np.integer]) -> Facet
     """
     indices = np.asarray(facets, dtype=np.int64)
     coarse = _on_coarse_grid(prepared, indices)
-    again = _doubtful(coarse.rows)
     solutions = _solutions(prepared, coarse)
-    if len(again) == 0:
-        return solutions
-    finer = _solutions(prepared, _on_fine_grid(prepared, indices[again]))
-    resolved = np.flatnonzero(finer.rows["verdict"] != Verdict.UNRESOLVED)
-    return replace_rows(solutions, again[resolved], take_rows(finer, resolved))
+    again = _doubtful(coarse.rows)
+    if len(again):
+        finer = _solutions(prepared, _on_fine_grid(prepared, indices[again]))
+        resolved = np.flatnonzero(finer.rows["verdict"] != Verdict.UNRESOLVED)
+        solutions = replace_rows(solutions, again[resolved], take_rows(finer, resolved))
+    again = _saturated(coarse)
+    if len(again):
+        work = _new_work(prepared, prepared.fine, prepared.fine_tube, indices[again])
+        _by_energy(prepared, work, np.arange(len(again)))
+        finer = _solutions(prepared, work)
+        better = np.flatnonzero(finer.rows[_COST] < solutions.rows[_COST][again])
+        solutions = replace_rows(solutions, again[better], take_rows(finer, better))
+    return solutions
+
+
+def _saturated(work: Work) -> Ints:
+    """Rows of flights at full thrust most of the time."""
+    full = np.linalg.norm(work.thrust, axis=2) > FULL_THRUST
+    reachable = work.rows["verdict"] == Verdict.REACHABLE
+    return np.flatnonzero(reachable & (full.mean(axis=1) >= SATURATED_SHARE))
 
 
 def take_rows(solutions: FacetSolutions, places: Ints) -> FacetSolutions:

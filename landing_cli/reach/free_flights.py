@@ -24,13 +24,17 @@ Flags = NDArray[np.bool_]
 
 NEVER = 1 << 30
 FREE_LIMIT, CUT_LIMIT = 40, 36
+# The propellant's curvature is a bound, not exact: convergence is linear there.
+SCARCE_FACTOR = 4
 RETAKE_FROM = 5
 ENERGY_ONLY, MARGIN_WEIGHT = 1.0, 1e-3
 TOUCH = 1.0 - 1e-6
+# Nodes of a given path that lie below this are held above the ellipsoid; how often the planes follow.
+NEAR, FOLLOWED = 1.2, 3
 # |xi| that the tangent planes keep at first. Where a path still dips between two nodes below FLOOR, its
-# planes are raised by a little more than that and the facet is solved again, at most RAISES times. FLOOR
+# planes are raised by so many times the shortfall and the facet is solved again, ever more boldly. FLOOR
 # leaves room for what a parabola through three samples misses.
-CUT_LEVEL, FLOOR, RAISES = 1.0 + 2e-4, 1.0 + 1.2e-5, 6
+CUT_LEVEL, FLOOR, RAISES = 1.0 + 4e-4, 1.0 + 1.2e-5, (1.2, 1.2, 1.2, 1.5, 2.0, 3.0, 5.0)
 
 
 class Question(NamedTuple):
@@ -83,6 +87,33 @@ def best_flights(question: Question) -> tuple[Batch, Flags]:
     return best, around
 
 
+def flights_near(question: Question, position: Floats) -> Batch:
+    """Find the best flights in the neighbourhood of given paths that stay outside the ellipsoid.
+
+    Planes that touch the ellipsoid below a path's nodes hold for the path itself, so it is a flight of the
+    convex problem that they make; the planes then follow what is found.
+
+    Parameters
+    ----------
+    question : Question
+        Case, facets and objective.
+    position : (n, N + 1, 3) float
+        Nodes of the paths, solver axes.
+
+    Returns
+    -------
+    flights : Batch
+        CONVERGED where a flight was found.
+    """
+    n, intervals = len(question.targets), len(question.case.mid_cos)
+    flights, cuts, level = new_batch(n, intervals), no_cuts(n, intervals), np.full(n, CUT_LEVEL)
+    flights.position[:] = position
+    for _ in range(FOLLOWED):
+        _solve_again(question, flights, cuts, np.full(n, NEAR), level, np.arange(n))
+    _raise_over_dips(question, flights, cuts, level)
+    return flights
+
+
 def _around(question: Question, free_position: Floats, side: float) -> tuple[Batch, Flags]:
     """Solve a batch with tangent planes that follow the path, then frozen, then raised over dips."""
     case = question.case
@@ -92,38 +123,57 @@ def _around(question: Question, free_position: Floats, side: float) -> tuple[Bat
     level = np.full(n, CUT_LEVEL)
     flights = _solve(question, cuts, level, RETAKE_FROM, CUT_LIMIT)
     froze = flights.status == STALLED
-    stalled = np.flatnonzero(froze)
-    _solve_again(question, flights, cuts, np.full(n, TOUCH), level, stalled)
-    changed = np.flatnonzero(flights.status == CONVERGED)
-    for _ in range(RAISES):
-        lowest = np.empty(len(changed))
-        lowest_levels_between(case, flights.thrust[changed], lowest)
-        dips = lowest < FLOOR
-        changed = changed[dips]
-        level[changed] += 1.2 * (FLOOR - lowest[dips])
-        _solve_again(question, flights, cuts, level, level, changed)
-        changed = changed[flights.status[changed] == CONVERGED]
+    _solve_again(question, flights, cuts, np.full(n, TOUCH), level, np.flatnonzero(froze))
+    _raise_over_dips(question, flights, cuts, level)
     return flights, froze
+
+
+def _raise_over_dips(question: Question, flights: Batch, cuts: CutBatch, level: Floats) -> None:
+    """Solve again, with planes raised, where a path dips below FLOOR between two nodes.
+
+    A flight whose raised problem stalls keeps its place; its planes are raised further.
+    """
+    chosen = np.flatnonzero(flights.status == CONVERGED)
+    short = _shortfalls(question.case, flights, chosen)
+    for boldness in RAISES:
+        chosen, short = chosen[short > 0.0], short[short > 0.0]
+        level[chosen] += boldness * short
+        solved = _solve_again(question, flights, cuts, level, level, chosen)
+        short[solved] = _shortfalls(question.case, flights, chosen[solved])
+
+
+def _shortfalls(case: ScaledCase, flights: Batch, chosen: Ints) -> Floats:
+    """How far each path's dip lies below FLOOR."""
+    lowest = np.empty(len(chosen))
+    lowest_levels_between(case, flights.thrust[chosen], lowest)
+    return np.asarray(FLOOR - lowest)
 
 
 def _solve_again(
     question: Question, flights: Batch, cuts: CutBatch, touch: Floats, level: Floats, chosen: Ints
-) -> None:
-    """Solve chosen facets again with planes frozen on their paths, updating flights and cuts."""
+) -> Flags:
+    """Solve chosen facets again with planes frozen on their paths; update flights and cuts that converged.
+
+    Returns whether each converged.
+    """
     if len(chosen) == 0:
-        return
+        return np.zeros(0, dtype=np.bool_)
     part = CutBatch(cuts.planes[chosen], cuts.node[chosen], cuts.normal[chosen])
     freeze_many(question.case, flights.position[chosen], touch[chosen], part)
     again = _solve(_subset(question, chosen), part, level[chosen], NEVER, CUT_LIMIT)
-    again.iterations[:] += flights.iterations[chosen]
-    _take(flights, chosen, again, np.arange(len(chosen)))
-    flights.iterations[chosen] = again.iterations
-    cuts.planes[chosen], cuts.node[chosen], cuts.normal[chosen] = part
+    flights.iterations[chosen] += again.iterations
+    solved = again.status == CONVERGED
+    _take(flights, chosen[solved], again, np.flatnonzero(solved))
+    for whole, piece in zip(cuts, part, strict=True):
+        whole[chosen[solved]] = piece[solved]
+    return np.asarray(solved)
 
 
 def _solve(question: Question, cuts: CutBatch, level: Floats, retake_from: int, limit: int) -> Batch:
     """Run the kernel on a whole batch."""
     out = new_batch(len(question.targets), len(question.case.mid_cos))
+    if question.case.propellant < 1.0:
+        limit *= SCARCE_FACTOR
     solve_many(
         question.case,
         question.targets,

@@ -106,7 +106,12 @@ FACET_COLUMNS: tuple[Column, ...] = (
     ),
     Column("violation", "f8", "1", "least constraint violation, scaled; 0 where reachable"),
     Column("binding", "u1", "1", "constraint that binds", flags=Binding),
-    Column("thrust_margin", "f8", "1", "1 - least thrust level that makes the facet reachable"),
+    Column(
+        "thrust_margin",
+        "f8",
+        "1",
+        "1 - least share of thrust, and of bounded propellant, that suffices",
+    ),
     Column("iterations", "i4", "1", "solver iterations"),
     Column("handover_position_m", "f8", "m", "handover position, body frame", (3,)),
     Column("handover_velocity_m_s", "f8", "m s-1", "handover velocity, rotating frame", (3,)),

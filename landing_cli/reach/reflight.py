@@ -24,6 +24,7 @@ from landing_cli.flight.gauss import GAUSS_B
 from landing_cli.flight.legs import Leg
 from landing_cli.flight.replay import replay_many
 from landing_cli.flight.trajectory import Trajectory
+from landing_cli.reach.delivery import CLEARANCE_SPACING
 from landing_cli.reach.flown import flown_legs
 from landing_cli.reach.records import FacetSolutions, LandingCase
 
@@ -159,7 +160,10 @@ def _measure(
     peak_final = arc.peak_n(planned=case.final_stage_thrust == "paper") / craft.thrust_max_n
     landed_kg = flown.mass_kg[-1]
     path = np.concatenate([descent_path, arc.position_m[1:]])
-    clearance, _ = path_clearance(ground.surface, path, ground.mean_edge_m, TOUCHDOWN_TOLERANCE_M, np.inf)
+    radius_m = ground.mean_edge_m
+    clearance, _ = path_clearance(
+        ground.surface, path, radius_m, TOUCHDOWN_TOLERANCE_M, CLEARANCE_SPACING * radius_m
+    )
     return {
         "touchdown_miss_m": math.dist(flown.position_m[-1], target),
         "touchdown_speed_m_s": float(np.linalg.norm(flown.velocity_m_s[-1])),

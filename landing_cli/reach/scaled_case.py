@@ -136,11 +136,10 @@ def gravity_and_gradient(
 
 
 @kernel
-def gravity_at_angle(
-    case: ScaledCase, angle: float, x: float, y: float, z: float
+def gravity_in_space(
+    case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float
 ) -> tuple[float, float, float]:
-    """Gravity at a point in solver axes, scaled, the body being turned by ``angle``, rad."""
-    cosine, sine = math.cos(angle), math.sin(angle)
+    """Gravity at a point in solver axes, scaled, the body being turned by the given angle."""
     bx, by = cosine * x + sine * y, cosine * y - sine * x
     scale = core_scale(case, bx, by, z)
     ax, ay, az = acceleration(case.gravity_kind, case.gravity_params, scale * bx, scale * by, scale * z)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.kernel import kernel
-from landing_cli.reach.scaled_case import ScaledCase, gravity_and_gradient, gravity_at_angle
+from landing_cli.reach.scaled_case import ScaledCase, gravity_and_gradient, gravity_in_space
 
 Floats = NDArray[np.float64]
 
@@ -153,26 +153,28 @@ def fly_accurately(case: ScaledCase, thrust: Floats, samples: Floats) -> None:
         s[i], s[3 + i] = case.position[i], case.velocity[i]
     s[6] = 1.0
     samples[0, :] = s
+    # the body's angle at the start and at the middle and end of each step, turned on by half a step
+    old_c, old_s = math.cos(case.spin), -math.sin(case.spin)
+    turn_c, turn_s = math.cos(0.5 * h * case.spin), math.sin(0.5 * h * case.spin)
     row = 0
     for k in range(n):
         Fx, Fy, Fz = thrust[k, 0], thrust[k, 1], thrust[k, 2]
         flow = case.mass_flow * math.sqrt(Fx * Fx + Fy * Fy + Fz * Fz)
         for _ in range(substeps):
-            angle = case.spin * (row * h - 1.0)
+            mid_c, mid_s = old_c * turn_c - old_s * turn_s, old_s * turn_c + old_c * turn_s
+            end_c, end_s = mid_c * turn_c - mid_s * turn_s, mid_s * turn_c + mid_c * turn_s
             mid, end = s[6] - 0.5 * h * flow, s[6] - h * flow
-            g0, g1, g2 = gravity_at_angle(case, angle, s[0], s[1], s[2])
+            g0, g1, g2 = gravity_in_space(case, old_c, old_s, s[0], s[1], s[2])
             a0, a1, a2 = g0 + Fx / s[6], g1 + Fy / s[6], g2 + Fz / s[6]
             x0, x1, x2 = s[0] + 0.5 * h * s[3], s[1] + 0.5 * h * s[4], s[2] + 0.5 * h * s[5]
-            g0, g1, g2 = gravity_at_angle(case, angle + 0.5 * h * case.spin, x0, x1, x2)
+            g0, g1, g2 = gravity_in_space(case, mid_c, mid_s, x0, x1, x2)
             b0, b1, b2 = g0 + Fx / mid, g1 + Fy / mid, g2 + Fz / mid
             q = 0.25 * h * h
-            g0, g1, g2 = gravity_at_angle(
-                case, angle + 0.5 * h * case.spin, x0 + q * a0, x1 + q * a1, x2 + q * a2
-            )
+            g0, g1, g2 = gravity_in_space(case, mid_c, mid_s, x0 + q * a0, x1 + q * a1, x2 + q * a2)
             c0, c1, c2 = g0 + Fx / mid, g1 + Fy / mid, g2 + Fz / mid
             q = 0.5 * h * h
             x0, x1, x2 = s[0] + h * s[3] + q * b0, s[1] + h * s[4] + q * b1, s[2] + h * s[5] + q * b2
-            g0, g1, g2 = gravity_at_angle(case, angle + h * case.spin, x0, x1, x2)
+            g0, g1, g2 = gravity_in_space(case, end_c, end_s, x0, x1, x2)
             d0, d1, d2 = g0 + Fx / end, g1 + Fy / end, g2 + Fz / end
             q = h * h / 6.0
             s[0] += h * s[3] + q * (a0 + b0 + c0)
@@ -183,6 +185,7 @@ def fly_accurately(case: ScaledCase, thrust: Floats, samples: Floats) -> None:
             s[4] += q * (a1 + 2.0 * (b1 + c1) + d1)
             s[5] += q * (a2 + 2.0 * (b2 + c2) + d2)
             s[6] = end
+            old_c, old_s = end_c, end_s
             row += 1
             samples[row, :] = s
 
