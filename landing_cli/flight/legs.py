@@ -151,4 +151,5 @@ class GaussAccelerationLeg:
         return float(self.edges_s[-1])
 
 
-Leg = ThrustNodesLeg | CostateLeg | FinalArcLeg | BezierLeg | LinearAccelerationLeg | GaussAccelerationLeg
+AccelerationLeg = BezierLeg | LinearAccelerationLeg | GaussAccelerationLeg
+Leg = ThrustNodesLeg | CostateLeg | FinalArcLeg | AccelerationLeg

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.bvh import SurfaceIndex
-from landing_cli.flight.legs import BezierLeg, GaussAccelerationLeg, LinearAccelerationLeg
+from landing_cli.flight.legs import AccelerationLeg
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.flight.trajectory import Trajectory
 
@@ -22,7 +22,6 @@ MassModel = Literal["variable", "constant"]
 Objective = Literal["fuel", "energy"]
 TerminalConditions = Literal["rest", "paper"]
 PlanStatus = Literal["planned", "infeasible", "unresolved"]
-PlanControl = BezierLeg | LinearAccelerationLeg | GaussAccelerationLeg
 Parameter = float | int | str | bool | None | list[float] | list[list[float]] | list[str]
 
 CHECK_SAMPLES = 2001
@@ -187,8 +186,8 @@ class Plan:
         In the analyst's words: what binds, and by how much.
     trajectory : Trajectory or None
         `CHECK_SAMPLES` samples of the best path found, also of one that breaks a constraint.
-    control : BezierLeg, LinearAccelerationLeg, GaussAccelerationLeg or None
-        What suffices to fly the path again.
+    control : tuple of BezierLeg, LinearAccelerationLeg, GaussAccelerationLeg
+        What suffices to fly the path again, leg after leg; empty without a path.
     tof_s : float, s
     fuel_kg, delta_v_m_s, peak_thrust_n : float
         NaN without a path.
@@ -209,7 +208,7 @@ class Plan:
     status: PlanStatus
     message: str
     trajectory: Trajectory | None
-    control: PlanControl | None
+    control: tuple[AccelerationLeg, ...]
     tof_s: float
     fuel_kg: float
     delta_v_m_s: float
