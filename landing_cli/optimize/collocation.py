@@ -113,12 +113,16 @@ class GaussSpan:
         The start -1 followed by the nodes: where the state lives.
     derivative : (n, n + 1) float
         Takes the state on the support to its derivative at the nodes (Benson 2005).
+    integral : (n, n) float
+        Takes a derivative at the nodes to the change from -1 to each node: the inverse of ``derivative``
+        without its first column.
     """
 
     nodes: FloatArray
     weights: FloatArray
     support: FloatArray
     derivative: FloatArray
+    integral: FloatArray
 
     def state_at(self, points: ArrayLike) -> FloatArray:
         """Take the state on the support to its value at points: (m, n + 1) float for (m,) points."""
@@ -143,4 +147,5 @@ def gauss_span(n: int) -> GaussSpan:
     """
     nodes, weights = legendre_gauss(n)
     support = np.concatenate([[-1.0], nodes])
-    return GaussSpan(nodes, weights, support, differentiation_matrix(support)[1:])
+    derivative = differentiation_matrix(support)[1:]
+    return GaussSpan(nodes, weights, support, derivative, np.linalg.inv(derivative[:, 1:]))

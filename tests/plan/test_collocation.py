@@ -107,3 +107,10 @@ def test_differentiation_on_any_nodes() -> None:
 def test_weights_of_equal_spacing_are_binomial() -> None:
     weights = barycentric_weights(np.arange(6.0))
     np.testing.assert_allclose(weights / weights[0], [1, -5, 10, -10, 5, -1], rtol=1e-13, atol=0)
+
+
+@pytest.mark.parametrize("n", SIZES)
+def test_integral_is_exact_to_degree_n_minus_1(n: int) -> None:
+    span, p = gauss_span(n), polynomial(n - 1)
+    exact = p.integ()(span.nodes) - p.integ()(-1.0)
+    np.testing.assert_allclose(span.integral @ p(span.nodes), exact, rtol=0, atol=1e-13 * np.abs(exact).max())
