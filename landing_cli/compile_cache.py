@@ -10,7 +10,7 @@ import hashlib
 import os
 from pathlib import Path
 
-ROOMS = ("body", "flight", "optimize", "reach")
+ROOMS = ("body", "flight", "optimize", "reach", "plan")
 
 
 def fingerprint(package: Path) -> str:

@@ -33,7 +33,8 @@ ROOMS: dict[str, set[str]] = {
     "scenario": TOOLS,
     "results": TOOLS,
     "reach": RECORDS,
-    "cli": {"reach", *RECORDS},
+    "plan": RECORDS,
+    "cli": {"reach", "plan", *RECORDS},
 }
 # library -> the only place that knows it
 LIBRARIES = {

@@ -238,9 +238,10 @@ def _short(value: object) -> object:
 
 def _say_plan(loaded: LoadedScenario, path: Path, as_json: bool) -> None:
     from landing_cli.scenario.build import build
+    from landing_cli.scenario.sections import reach_section
 
+    reach = reach_section(loaded)
     facets = len(build(loaded).asteroid.mesh.faces)
-    reach = loaded.scenario.reach
     cases = [
         {"case": name, "initial_state": state.name, "tof_s": tof_s, "facets": facets}
         for name, state, tof_s in reach.cases()
