@@ -16,6 +16,7 @@ from landing_cli.body.bvh import (
     closest_slot,
     triangle_distance2,
 )
+from landing_cli.body.vertex_distance import vertex_distance
 
 FloatArray = NDArray[np.float64]
 
@@ -88,3 +89,42 @@ def _offset(t: FloatArray, feature: int, x: float, y: float, z: float) -> tuple[
     ex, ey, ez = t[head] - t[tail], t[head + 1] - t[tail + 1], t[head + 2] - t[tail + 2]
     along = (px * ex + py * ey + pz * ez) / (ex * ex + ey * ey + ez * ez)
     return px - along * ex, py - along * ey, pz - along * ez
+
+
+def vertices_with_slopes(surface: SurfaceIndex, points: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Distance from each point to the nearest vertex, and its gradient.
+
+    Parameters
+    ----------
+    surface : SurfaceIndex
+        The surface.
+    points : (n, 3) float, m, body frame
+        The points; along a path, each helps the next.
+
+    Returns
+    -------
+    distances : (n,) float, m
+    slopes : (n, 3) float, body frame
+        Unit vectors away from the vertex; zero on it.
+    """
+    points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+    distances, slopes = np.zeros(len(points)), np.zeros((len(points), 3))
+    _fill_vertices(surface, points, distances, slopes)
+    return distances, slopes
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fill_vertices(
+    surface: SurfaceIndex, points: FloatArray, distances: FloatArray, slopes: FloatArray
+) -> None:
+    slot = 0
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        distances[i], slot = vertex_distance(surface, x, y, z, slot)
+        t, nearest = surface.triangles[slot], np.inf
+        for corner in range(0, 9, 3):
+            dx, dy, dz = x - t[corner], y - t[corner + 1], z - t[corner + 2]
+            length = np.sqrt(dx * dx + dy * dy + dz * dz)
+            if 0.0 < length < nearest:
+                nearest = length
+                slopes[i, 0], slopes[i, 1], slopes[i, 2] = dx / length, dy / length, dz / length
