@@ -26,7 +26,7 @@ def plane_section(mesh: Mesh, origin_m: ArrayLike, normal: ArrayLike) -> FloatAr
         One segment for each facet that the plane cuts, in the order of the facets; together they close.
         A vertex in the plane counts as above it.
     """
-    height = (mesh.vertices - origin_m) @ np.asarray(normal, dtype=np.float64)
+    height = (mesh.vertices - np.asarray(origin_m, dtype=np.float64)) @ np.asarray(normal, dtype=np.float64)
     above = (height >= 0.0)[mesh.faces]
     cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
     corners, height, above = mesh.corners[cut], height[mesh.faces[cut]], above[cut]
