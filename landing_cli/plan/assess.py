@@ -326,6 +326,30 @@ def _too_close(case: PlanCase, measured: Measured) -> list[str]:
     return told
 
 
+def at_times(flown: Trajectory, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Position and velocity between the knots of an integration, on cubics through both.
+
+    Parameters
+    ----------
+    flown : Trajectory
+        An integrator's steps.
+    t : (n,) float, s
+        Times within it.
+
+    Returns
+    -------
+    r, v : (n, 3) float, m, m/s
+        Off by jerk rate times step^4 / 384: micrometres for steps of some seconds.
+    """
+    k = np.clip(np.searchsorted(flown.t_s, t, side="right") - 1, 0, len(flown.t_s) - 2)
+    h = (flown.t_s[k + 1] - flown.t_s[k])[:, None]
+    s = ((t - flown.t_s[k])[:, None]) / h
+    r0, r1 = flown.position_m[k], flown.position_m[k + 1]
+    d0, d1 = h * flown.velocity_m_s[k], h * flown.velocity_m_s[k + 1]
+    square, cubic = 3.0 * (r1 - r0) - 2.0 * d0 - d1, d0 + d1 - 2.0 * (r1 - r0)
+    return r0 + s * (d0 + s * (square + s * cubic)), (d0 + s * (2.0 * square + 3.0 * s * cubic)) / h
+
+
 def _on_curve(
     case: PlanCase, leg: BezierLeg, t: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -354,7 +378,7 @@ def _integrated(
         integrator="gauss",
     )
     spent = craft.exhaust_velocity_m_s * np.log(craft.mass_kg / flown.mass_kg)
-    r, v = _between_knots(flown, t)
+    r, v = at_times(flown, t)
     return r, v, accelerations_at(control, t, w), np.interp(t, flown.t_s, spent)
 
 
@@ -383,17 +407,6 @@ def accelerations_at(control: Sequence[AccelerationLeg], t: FloatArray, w: float
     return u
 
 
-def _between_knots(flown: Trajectory, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Position and velocity on the cubics between an integrator's knots."""
-    k = np.clip(np.searchsorted(flown.t_s, t, side="right") - 1, 0, len(flown.t_s) - 2)
-    h = (flown.t_s[k + 1] - flown.t_s[k])[:, None]
-    s = ((t - flown.t_s[k])[:, None]) / h
-    r0, r1 = flown.position_m[k], flown.position_m[k + 1]
-    d0, d1 = h * flown.velocity_m_s[k], h * flown.velocity_m_s[k + 1]
-    square, cubic = 3.0 * (r1 - r0) - 2.0 * d0 - d1, d0 + d1 - 2.0 * (r1 - r0)
-    return r0 + s * (d0 + s * (square + s * cubic)), (d0 + s * (2.0 * square + 3.0 * s * cubic)) / h
-
-
 def _cumulative(values: FloatArray, step: float) -> FloatArray:
     """Integral from the first of even samples up to each, by the cubics through four neighbours."""
     inner = (13.0 * (values[1:-2] + values[2:-1]) - values[:-3] - values[3:]) / 24.0
@@ -411,5 +424,5 @@ def _angles(offset: FloatArray, normal: FloatArray) -> FloatArray:
 
 def _landing_angle_deg(trajectory: Trajectory, normal: FloatArray) -> float:
     end_s = trajectory.t_s[-1]
-    r, _ = _between_knots(trajectory, np.array([max(end_s - ANGLE_BEFORE_S, 0.0)]))
+    r, _ = at_times(trajectory, np.array([max(end_s - ANGLE_BEFORE_S, 0.0)]))
     return math.degrees(float(_angles(r - trajectory.position_m[-1], normal)[0]))
