@@ -29,7 +29,7 @@ def plane_section(mesh: Mesh, origin_m: ArrayLike, normal: ArrayLike) -> FloatAr
     height = (mesh.vertices - np.asarray(origin_m, dtype=np.float64)) @ np.asarray(normal, dtype=np.float64)
     above = (height >= 0.0)[mesh.faces]
     cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
-    corners, height, above = mesh.corners[cut], height[mesh.faces[cut]], above[cut]
+    corners, height, above = mesh.vertices[mesh.faces[cut]], height[mesh.faces[cut]], above[cut]
     following = np.roll(corners, -1, axis=1), np.roll(height, -1, axis=1), np.roll(above, -1, axis=1)
     crossed = above != following[2]
     tail, low = corners[crossed], height[crossed]

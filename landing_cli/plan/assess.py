@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.body.clearance import TOUCHDOWN_TOLERANCE_M, signed_distances
-from landing_cli.body.vertex_distance import vertex_distances
+from landing_cli.body.clearance import TOUCHDOWN_TOLERANCE_M
 from landing_cli.flight.acceleration_control import natural_accelerations, thrust_accelerations
 from landing_cli.flight.bezier_curve import curve_states
 from landing_cli.flight.legs import AccelerationLeg, BezierLeg
 from landing_cli.flight.replay import replay
 from landing_cli.flight.trajectory import Trajectory
+from landing_cli.plan.path_check import least_distance
 from landing_cli.plan.records import CHECK_SAMPLES, Parameter, Plan, PlanCase, PlanStatus
 
 FloatArray = NDArray[np.float64]
@@ -37,8 +37,10 @@ class Measured:
     ----------
     trajectory : Trajectory
         Even samples.
-    distance_m : (n,) float, m
-        Signed distance of every sample to the surface.
+    depth_in_cone_m : float, m
+        How far the deepest sample after the entry lies below the surface; negative where all lie above it.
+    deepest, closest : int
+        That sample, and the one closest to the surface before the entry.
     cone_angle_rad : (n,) float, rad
         Angle from the touchdown between n_f and every sample.
     entry : int
@@ -50,7 +52,9 @@ class Measured:
     """
 
     trajectory: Trajectory
-    distance_m: FloatArray
+    depth_in_cone_m: float
+    deepest: int
+    closest: int
     cone_angle_rad: FloatArray
     entry: int
     fuel_kg: float
@@ -211,23 +215,26 @@ def measure_trajectory(case: PlanCase, trajectory: Trajectory, delta_v_m_s: floa
     Measured
     """
     path, craft = trajectory.position_m, case.spacecraft
-    distance = signed_distances(case.surface, path)
     angle = _angles(path - path[-1], case.site.normal)
     outside = np.flatnonzero(angle[:-1] > case.cone_half_angle_rad + CONE_TOLERANCE_RAD)
     entry = int(outside[-1]) + 1 if len(outside) else 0
-    before = slice(0, max(entry, 1))
+    before = max(entry, 1)
+    to_surface, closest = least_distance(case.surface, False, path, 0, before)
+    in_cone, deepest = least_distance(case.surface, False, path, entry, len(path))
     ratio = 1.0 - math.exp(-delta_v_m_s / craft.exhaust_velocity_m_s)
     spent = delta_v_m_s / craft.exhaust_velocity_m_s if case.mass_model == "constant" else ratio
     return Measured(
         trajectory=trajectory,
-        distance_m=distance,
+        depth_in_cone_m=-in_cone,
+        deepest=deepest,
+        closest=closest,
         cone_angle_rad=angle,
         entry=entry,
         fuel_kg=craft.mass_kg * spent,
         delta_v_m_s=delta_v_m_s,
         peak_thrust_n=float(np.linalg.norm(trajectory.thrust_n, axis=1).max()),
-        clearance_surface_m=float(distance[before].min()),
-        clearance_vertices_m=float(vertex_distances(case.surface, path[before]).min()),
+        clearance_surface_m=to_surface,
+        clearance_vertices_m=least_distance(case.surface, True, path, 0, before)[0],
         landing_angle_deg=_landing_angle_deg(trajectory, case.site.normal),
     )
 
@@ -314,15 +321,14 @@ def _too_close(case: PlanCase, measured: Measured) -> list[str]:
     entry, t = measured.entry, measured.trajectory.t_s
     if entry > 0 and not clearance >= case.clearance_m - CLEARANCE_TOLERANCE_M:
         what = "the surface" if surface else "the nearest vertex"
-        where = int(np.argmin(measured.distance_m[:entry]))
-        late = f" (t = {t[where]:.1f} s)" if surface else ""
+        late = f" (t = {t[measured.closest]:.1f} s)" if surface else ""
         told.append(
             f"it comes within {clearance:.4g} m of {what} before the cone{late}: {case.clearance_m:g} m asked"
         )
-    inside = measured.distance_m[entry:]
-    if inside.min() < -TOUCHDOWN_TOLERANCE_M:
-        where = entry + int(np.argmin(inside))
-        told.append(f"it cuts {-inside.min():.4g} m into the surface inside the cone (t = {t[where]:.1f} s)")
+    depth = measured.depth_in_cone_m
+    if depth > TOUCHDOWN_TOLERANCE_M:
+        late = f"t = {t[measured.deepest]:.1f} s"
+        told.append(f"it cuts {depth:.4g} m into the surface inside the cone ({late})")
     return told
 
 

@@ -13,11 +13,19 @@ from landing_cli.plan.grid_search import (
     thrust_limit_m_s2,
 )
 from landing_cli.plan.guide_candidates import GuideSearch, clearances, curve_of, prepare_search, price
-from landing_cli.plan.guide_points import Bounds, GuidePlane, beta_bounds
+from landing_cli.plan.guide_points import Bounds, GuidePlane, above_guide_point, beta_bounds
 from landing_cli.plan.records import BezierOptions, Parameter, Plan, PlanCase
 
 METHOD = "bezier"
 
+_WORDS = {
+    "clearance": "the clearance",
+    "last_control_point": "above P_5",
+    "tangent": "above the line from the start that grazes the body",
+    "velocity": "below where the initial velocity leads",
+    "start_radius": "not higher than the start",
+    "start_distance": "no farther than the start",
+}
 _STRETCHES = 8
 _STRETCHED_ENOUGH = 1e-3
 
@@ -139,35 +147,28 @@ def refusal(search: GuideSearch, method: str = METHOD) -> Plan:
     )
     if np.isinf(candidates.delta_v_m_s).all():
         return plan_from(search, closest, because=_no_room(search), refused_by="bounds", method=method)
-    count = f"none of {clear.size} pairs of guide points, nor of those about the best of them,"
+    count = f"none of {clear.size} choices of guide points, nor of those about the best of them,"
     if clear[index] == -np.inf:
         because = f"{count} leads to the site without cutting the body inside the cone"
         return plan_from(search, closest, because=because, refused_by="terrain", method=method)
-    because = f"{count} keeps its distance; the one that stays farthest is told"
+    because = f"{count} keeps its distance; of the one that stays farthest"
     return plan_from(search, closest, because=because, refused_by="clearance", method=method)
 
 
 def _no_room(search: GuideSearch) -> str:
-    limits = search.alpha
-    name = "alpha"
-    if limits.least <= limits.greatest:
-        limits, name = beta_bounds(search.case, search.plane, limits.least), "beta"
+    """Tell which bounds leave no guide point."""
+    alpha, plane = search.alpha, search.plane
+    if alpha.least > alpha.greatest:
+        return (
+            f"no guide point fits above the site: alpha has to be at least {alpha.least:.6g} m "
+            f"({_WORDS[alpha.least_by]}) and at most {alpha.greatest:.6g} m ({_WORDS[alpha.greatest_by]})"
+        )
+    beta = beta_bounds(search.case, plane)
+    least = max(beta.least, float(above_guide_point(search.case, plane, np.array([alpha.least]))[0]))
     return (
-        f"no guide point fits: {name} has to be at least {limits.least:.6g} m ({_words(limits.least_by)}) "
-        f"and at most {limits.greatest:.6g} m ({_words(limits.greatest_by)})"
+        f"no guide point fits above the body: beta has to be at least {least:.6g} m (the clearance, and "
+        f"above the other guide point) and at most {beta.greatest:.6g} m ({_WORDS[beta.greatest_by]})"
     )
-
-
-def _words(bound: str) -> str:
-    return {
-        "clearance": "the clearance",
-        "last_control_point": "above P_5",
-        "tangent": "above the line from the start that grazes the body",
-        "guide_point": "above the other guide point",
-        "velocity": "below where the initial velocity leads",
-        "start_radius": "not higher than the start",
-        "start_distance": "no farther than the start",
-    }[bound]
 
 
 def needs(search: GuideSearch, found: Found) -> str:
@@ -194,13 +195,12 @@ def _longer(search: GuideSearch, found: Found) -> str:
 def _parameters(search: GuideSearch, found: Found, points_m: np.ndarray) -> dict[str, Parameter]:
     """Every choice, with units, as it stands in the result."""
     plane, options = search.plane, search.options
-    beta = beta_bounds(search.case, plane, found.alpha_m)
     return {
         "line_of_sight": "blocked" if plane.blocked else "free",
         "alpha_m": found.alpha_m,
         "beta_m": found.beta_m if plane.blocked else None,
         **_limits("alpha", search.alpha),
-        **(_limits("beta", beta) if plane.blocked else {}),
+        **(_limits("beta", _beta_limits(search, found.alpha_m)) if plane.blocked else {}),
         "obstacle_guide_point_m": points_m[4].tolist(),
         "collision_guide_point_m": points_m[3].tolist(),
         "tangent_point_m": plane.tangent_point_m.tolist(),
@@ -212,6 +212,13 @@ def _parameters(search: GuideSearch, found: Found, points_m: np.ndarray) -> dict
         "candidates_checked": found.checked,
         "distances_computed": found.distances,
     }
+
+
+def _beta_limits(search: GuideSearch, alpha_m: float) -> Bounds:
+    """Limits of beta beside a given alpha."""
+    bounds = beta_bounds(search.case, search.plane)
+    above = float(above_guide_point(search.case, search.plane, np.array([alpha_m]))[0])
+    return bounds if above <= bounds.least else replace(bounds, least=above, least_by="guide_point")
 
 
 def _limits(name: str, bounds: Bounds) -> dict[str, Parameter]:

@@ -14,12 +14,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration
+from landing_cli.body.gravity.point_mass import point_acceleration
 from landing_cli.flight.bezier_curve import bezier_basis, first_control_points, last_control_points
 from landing_cli.plan.guide_points import DEGREE, GuidePlane
 from landing_cli.plan.records import PlanCase
 
 FloatArray = NDArray[np.float64]
+
+_POINT_MASS = int(GravityKind.POINT_MASS)
 
 
 class CurveFamily(NamedTuple):
@@ -129,7 +133,9 @@ def fill_costs(
     delta_v: FloatArray,
     peak: FloatArray,
 ) -> None:
-    """Write what each curve of a family costs (Lyu 2026, eqs 27-28), by the trapezoidal rule.
+    """Add up what each curve of a family costs (Lyu 2026, eqs 27-28), by the trapezoidal rule.
+
+    Curves are the inner loop, so that a processor takes several at once.
 
     Parameters
     ----------
@@ -139,42 +145,63 @@ def fill_costs(
         Parameters of the gravity model.
     family : CurveFamily
         The curves, at n times.
-    departure : (m, n, 3) float, m/s2
-        What the field pulls more than that model, for each curve and time; or (0, n, 3): nothing.
+    departure : (n, 3, m) float, m/s2
+        What the field pulls more than that model, for each time and curve; or (0, 3, m): nothing.
     alpha, beta : (m,) float, m
         Heights of the guide points.
     exhaust_velocity : float, m/s
         Infinity for a mass that stays constant.
     delta_v : (m,) float, m/s
-        Receives the velocity increments.
+        Zeros; receives the velocity increments.
     peak : (m,) float, m/s2
-        Receives the largest thrust over the initial mass, among the times.
+        Zeros; receives the largest thrust over the initial mass, among the times.
     """
-    n = family.position.shape[0]
+    n, m = family.position.shape[0], alpha.shape[0]
+    pull, before = np.zeros((3, m)), np.zeros(m)
     departs, loses_mass = departure.shape[0] > 0, exhaust_velocity < np.inf
-    for j in range(alpha.shape[0]):
-        a, b = alpha[j], beta[j]
-        spent, largest, before = 0.0, 0.0, 0.0
-        for i in range(n):
-            p, q = family.position[i], family.acceleration[i]
-            gx, gy, gz = acceleration(
-                kind,
-                params,
-                p[0, 0] + a * p[1, 0] + b * p[2, 0],
-                p[0, 1] + a * p[1, 1] + b * p[2, 1],
-                p[0, 2] + a * p[1, 2] + b * p[2, 2],
-            )
-            if departs:
-                gx, gy, gz = gx + departure[j, i, 0], gy + departure[j, i, 1], gz + departure[j, i, 2]
-            ux = q[0, 0] + a * q[1, 0] + b * q[2, 0] - gx
-            uy = q[0, 1] + a * q[1, 1] + b * q[2, 1] - gy
-            uz = q[0, 2] + a * q[1, 2] + b * q[2, 2] - gz
+    for i in range(n):
+        _fill_pull(kind, params, family.position[i], alpha, beta, pull)
+        if departs:
+            pull += departure[i]
+        q = family.acceleration[i]
+        q00, q01, q02, q10, q11, q12 = q[0, 0], q[0, 1], q[0, 2], q[1, 0], q[1, 1], q[1, 2]
+        q20, q21, q22 = q[2, 0], q[2, 1], q[2, 2]
+        half = 0.5 * family.step_s if i > 0 else 0.0
+        for j in range(m):
+            ux = q00 + alpha[j] * q10 + beta[j] * q20 - pull[0, j]
+            uy = q01 + alpha[j] * q11 + beta[j] * q21 - pull[1, j]
+            uz = q02 + alpha[j] * q12 + beta[j] * q22 - pull[2, j]
             u = math.sqrt(ux * ux + uy * uy + uz * uz)
-            if i > 0:
-                spent += 0.5 * family.step_s * (before + u)
-            before = u
-            largest = max(largest, u * math.exp(-spent / exhaust_velocity) if loses_mass else u)
-        delta_v[j], peak[j] = spent, largest
+            delta_v[j] += half * (before[j] + u)
+            before[j] = u
+        if loses_mass:
+            for j in range(m):
+                peak[j] = max(peak[j], before[j] * math.exp(-delta_v[j] / exhaust_velocity))
+        else:
+            for j in range(m):
+                peak[j] = max(peak[j], before[j])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fill_pull(
+    kind: int, params: FloatArray, p: FloatArray, alpha: FloatArray, beta: FloatArray, pull: FloatArray
+) -> None:
+    """Write the gravity (3, m) on every curve at one time; a point mass apart, without a branch inside."""
+    p00, p01, p02, p10, p11, p12 = p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2]
+    p20, p21, p22 = p[2, 0], p[2, 1], p[2, 2]
+    if kind == _POINT_MASS:
+        gm = params[0]
+        for j in range(alpha.shape[0]):
+            x = p00 + alpha[j] * p10 + beta[j] * p20
+            y = p01 + alpha[j] * p11 + beta[j] * p21
+            z = p02 + alpha[j] * p12 + beta[j] * p22
+            pull[0, j], pull[1, j], pull[2, j] = point_acceleration(gm, x, y, z)
+    else:
+        for j in range(alpha.shape[0]):
+            x = p00 + alpha[j] * p10 + beta[j] * p20
+            y = p01 + alpha[j] * p11 + beta[j] * p21
+            z = p02 + alpha[j] * p12 + beta[j] * p22
+            pull[0, j], pull[1, j], pull[2, j] = acceleration(kind, params, x, y, z)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

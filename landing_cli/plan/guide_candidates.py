@@ -26,8 +26,15 @@ from landing_cli.plan.field_departure import (
     pricing_field,
     sampled_departure,
 )
-from landing_cli.plan.guide_points import Bounds, GuidePlane, alpha_bounds, beta_bounds, guide_plane
-from landing_cli.plan.path_check import KEPT, check_path, cone_entry, least_clearance
+from landing_cli.plan.guide_points import (
+    Bounds,
+    GuidePlane,
+    above_guide_point,
+    alpha_bounds,
+    beta_bounds,
+    guide_plane,
+)
+from landing_cli.plan.path_check import KEPT, check_path, cone_entry, least_distance
 from landing_cli.plan.records import CHECK_SAMPLES, BezierOptions, PlanCase
 
 FloatArray = NDArray[np.float64]
@@ -158,8 +165,9 @@ def heights(
     alphas = bounds.least + alpha_shares * (bounds.greatest - bounds.least)
     low, high = np.zeros((2, alphas.size))
     if search.plane.blocked:
-        limits = [beta_bounds(search.case, search.plane, float(alpha)) for alpha in alphas]
-        low, high = np.array([(limit.least, limit.greatest) for limit in limits]).T
+        limits = beta_bounds(search.case, search.plane)
+        low = np.maximum(limits.least, above_guide_point(search.case, search.plane, alphas))
+        high = np.full(alphas.size, limits.greatest)
     beta = (low[:, None] + beta_shares * (high - low)[:, None]).ravel()
     empty = (high < low) | (bounds.greatest < bounds.least)
     count = beta_shares.size
@@ -191,7 +199,7 @@ def price(
     if departs and field is not search.case.asteroid.gravity:
         more = _departure(search, alpha_shares, beta_shares)
     else:
-        more = np.zeros((0, search.options.samples, 3))
+        more = np.zeros((0, 3, alpha.size))
     fill_costs(
         int(field.kind),
         field.params,
@@ -215,7 +223,7 @@ def _departure(search: GuideSearch, alpha_shares: FloatArray, beta_shares: Float
     curves = constant + alpha[:, None, None] * by_alpha + beta[:, None, None] * by_beta
     sampled = sampled_departure(search.case, curves, search.options.samples)
     weights = np.kron(lagrange_weights(nodes[0], alpha_shares), lagrange_weights(nodes[1], beta_shares))
-    return np.ascontiguousarray(np.tensordot(weights, sampled, axes=1))
+    return np.ascontiguousarray(np.moveaxis(np.tensordot(weights, sampled, axes=1), 0, 2))
 
 
 def first_kept(search: GuideSearch, candidates: Candidates, order: IntArray, start: int) -> tuple[int, int]:
@@ -337,4 +345,4 @@ def _fill_clearances(
         fill_path(sampled, alpha[j], beta[j], path)
         entry = cone_entry(path, apex, axis, half_angle)
         if check_path(surface, by_vertices, path[entry:], 0, 0.0)[0] == KEPT:
-            out[j] = least_clearance(surface, by_vertices, path, entry)
+            out[j] = least_distance(surface, by_vertices, path, 0, entry)[0]

@@ -159,8 +159,8 @@ def alpha_bounds(case: PlanCase, plane: GuidePlane, last_point_m: FloatArray) ->
     return _bounds(case, plane, plane.origin_m, n_f, floors)
 
 
-def beta_bounds(case: PlanCase, plane: GuidePlane, alpha_m: float) -> Bounds:
-    """Limits of beta in r_ac = r_t + beta e_z (Lyu 2026, eqs 21-26).
+def beta_bounds(case: PlanCase, plane: GuidePlane) -> Bounds:
+    """Limits of beta in r_ac = r_t + beta e_z (Lyu 2026, eqs 21, 23-26), whatever alpha is.
 
     Parameters
     ----------
@@ -168,21 +168,35 @@ def beta_bounds(case: PlanCase, plane: GuidePlane, alpha_m: float) -> Bounds:
         What is asked.
     plane : GuidePlane
         Its guide plane.
-    alpha_m : float, m
-        Height of the other guide point, which r_ac has to stay above: beta_2 = (r_ao - r_t) . e_z, where
-        eq 22 prints r_ao . e_z.
 
     Returns
     -------
     Bounds
-        Eqs 23 and 24 are printed as copies of 17 and 16; meant are r_t for r_f and e_z for n_f.
+        Eqs 23 and 24 are printed as copies of 17 and 16; meant are r_t for r_f and e_z for n_f. The limit of
+        eq 22 depends on alpha: `above_guide_point`.
     """
-    r_ao = plane.origin_m + alpha_m * case.site.normal
-    floors: list[tuple[float, LowerBound]] = [
-        (case.clearance_m, "clearance"),
-        (float((r_ao - plane.tangent_point_m) @ plane.e_z), "guide_point"),
-    ]
+    floors: list[tuple[float, LowerBound]] = [(case.clearance_m, "clearance")]
     return _bounds(case, plane, plane.tangent_point_m, plane.e_z, floors)
+
+
+def above_guide_point(case: PlanCase, plane: GuidePlane, alpha_m: FloatArray) -> FloatArray:
+    """Least beta that puts r_ac above r_ao along e_z: (r_ao - r_t) . e_z, where eq 22 prints r_ao . e_z.
+
+    Parameters
+    ----------
+    case : PlanCase
+        What is asked.
+    plane : GuidePlane
+        Its guide plane.
+    alpha_m : (k,) float, m
+        Heights of r_ao.
+
+    Returns
+    -------
+    (k,) float, m
+    """
+    foot = float((plane.origin_m - plane.tangent_point_m) @ plane.e_z)
+    return np.asarray(foot + alpha_m * float(case.site.normal @ plane.e_z))
 
 
 def _bounds(

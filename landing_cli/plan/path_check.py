@@ -106,37 +106,40 @@ def check_path(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def least_clearance(surface: SurfaceIndex, by_vertices: bool, path: FloatArray, entry: int) -> float:
-    """Least distance of a path before its cone entry.
+def least_distance(
+    surface: SurfaceIndex, by_vertices: bool, path: FloatArray, start: int, stop: int
+) -> tuple[float, int]:
+    """Least distance of a stretch of a path, from its end to its start; what cannot be less is skipped.
 
     Parameters
     ----------
     surface : SurfaceIndex
         The surface.
     by_vertices : bool
-        Whether the distance is that to the nearest vertex (still negative where a sample lies in the body).
+        Whether the distance is that to the nearest vertex (that to the surface where a sample lies inside the
+        body: a vertex distance has no sign).
     path : (n, 3) float, m, body frame
         Samples in the order of flight.
-    entry : int
-        First sample inside the cone for good.
+    start, stop : int
+        First sample of the stretch, and the first beyond it.
 
     Returns
     -------
-    float, m
-        Infinity where the whole path lies in the cone.
+    (float, int)
+        Distance (m) and sample; infinity and -1 for an empty stretch.
     """
-    least, slot, corner = np.inf, 0, 0
+    least, where, slot, corner = np.inf, -1, 0, 0
     slack, kx, ky, kz = -1.0, 0.0, 0.0, 0.0
-    for k in range(entry - 1, -1, -1):
+    for k in range(stop - 1, start - 1, -1):
         x, y, z = path[k, 0], path[k, 1], path[k, 2]
         if slack > 0.0 and (x - kx) ** 2 + (y - ky) ** 2 + (z - kz) ** 2 <= slack * slack:
             continue
         kx, ky, kz = x, y, z
         distance, slot = signed_distance_from(surface, x, y, z, slot)
-        inside = distance < 0.0
-        if by_vertices and not inside:
+        outside = distance  # how far the surface is, before which a vertex distance keeps its meaning
+        if by_vertices and distance >= 0.0:
             distance, corner = vertex_distance(surface, x, y, z, corner)
-        least = min(least, distance)
-        # a vertex distance has no sign: only outside does it tell how far to the next smaller one
-        slack = 0.0 if by_vertices and inside else distance - least
-    return least
+        if distance < least:
+            least, where = distance, k
+        slack = min(outside, distance - least) if by_vertices else distance - least
+    return least, where

@@ -271,7 +271,7 @@ def _checks(entry: PlanEntry, flown: Measured) -> dict[str, Check]:
         "touchdown_speed_m_s": math.dist(path.velocity_m_s[-1], case.landing_velocity_m_s),
         "thrust_excess": flown.peak_thrust_n / case.spacecraft.thrust_max_n - 1.0,
         "clearance_shortfall_m": case.clearance_m - clearance if flown.entry > 0 else 0.0,
-        "depth_in_cone_m": -float(flown.distance_m[flown.entry :].min()),
+        "depth_in_cone_m": flown.depth_in_cone_m,
         "propellant_excess_kg": 0.0 if propellant is None else flown.fuel_kg - propellant,
         "stored_fuel": abs(flown.fuel_kg / plan.fuel_kg - 1.0),
         "stored_peak_thrust": abs(flown.peak_thrust_n / plan.peak_thrust_n - 1.0),
