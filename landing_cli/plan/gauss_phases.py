@@ -1,17 +1,15 @@
-"""Flight over phases of Legendre-Gauss collocation, and its slopes with respect to the control.
+"""Flight over a phase of Legendre-Gauss collocation, and its slopes by the control.
 
-In each phase the Gauss pseudospectral equations (Benson 2005) say, at the nodes,
+In a phase the Gauss pseudospectral equations (Benson 2005) say, at the nodes,
 
     D r = (h/2) v,    D v = (h/2) (g(r) - 2 w x v - w x (w x r) + u),
 
-with the end of the phase by quadrature. The control u at the nodes determines the states, so they are not
-unknowns of the optimisation: Newton's method solves the equations for the total acceleration at the nodes,
-and the same matrix gives the slopes. A plan keeps the equations of motion at every iterate.
+with the other end of the phase by quadrature. The control u at the nodes determines the states: Newton's
+method solves the equations for the total acceleration at the nodes, and the same matrix gives the slopes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,37 +57,34 @@ class Phase:
 
 @dataclass(frozen=True, eq=False)
 class PhaseFlight:
-    """States of a phase on its support (start and nodes), and their slopes.
+    """States at the nodes of a phase, and their slopes by its own control.
 
     Attributes
     ----------
-    position_m, velocity_m_s : (n + 1, 3) float, m, m/s, rotating body frame
-    acceleration_m_s2 : (n, 3) float, m/s2
-        Total acceleration at the nodes.
-    position_slope : (n + 1, 3, q) float
-        Derivative of the positions with respect to the control of all phases.
-    end : (6,) float, m, m/s
-        State at the end, by quadrature.
-    end_slope : (6, q) float
-        Its derivative.
+    position_m : (n, 3) float, m, rotating body frame
+    position_slope : (n, 3, q) float, m per m/s2
+        By the q = 3 n components of the control.
+    far : (6,) float, m, m/s
+        State at the end of the phase that is not its anchor, by quadrature.
+    far_slope : (6, q) float
     """
 
     position_m: FloatArray
-    velocity_m_s: FloatArray
-    acceleration_m_s2: FloatArray
     position_slope: FloatArray
-    end: FloatArray
-    end_slope: FloatArray
+    far: FloatArray
+    far_slope: FloatArray
 
 
-def fly_phases(
+def fly_phase(
     field: GravityField,
     rotation_rate_rad_s: float,
-    start: FloatArray,
-    phases: Sequence[Phase],
-    controls: Sequence[FloatArray],
-) -> list[PhaseFlight]:
-    """Solve the collocation equations of every phase, one after the other.
+    phase: Phase,
+    anchor: FloatArray,
+    control_m_s2: FloatArray,
+    *,
+    backwards: bool = False,
+) -> PhaseFlight:
+    """Solve the collocation equations of a phase.
 
     Parameters
     ----------
@@ -97,82 +92,49 @@ def fly_phases(
         Gravity.
     rotation_rate_rad_s : float, rad/s
         Spin rate about +z.
-    start : (6,) float, m, m/s, rotating body frame
-        Initial position and velocity.
-    phases : sequence of Phase
-        In order, each starting where the last one ends.
-    controls : sequence of (n, 3) float, m/s2, rotating body frame
-        Thrust acceleration at the nodes of each phase; together the q unknowns of the slopes, in this order.
+    phase : Phase
+        The phase.
+    anchor : (6,) float, m, m/s, rotating body frame
+        Position and velocity at its start, or at its end.
+    control_m_s2 : (n, 3) float, m/s2, rotating body frame
+        Thrust acceleration at the nodes.
+    backwards : bool
+        Whether the anchor is the end. The polynomials are the same either way: what Gauss quadrature carries
+        from one end to the other is the polynomial's own value there.
 
     Returns
     -------
-    list of PhaseFlight
+    PhaseFlight
         With values that are not finite where Newton's method finds no states.
     """
-    total = sum(control.size for control in controls)
-    state, slope, first = start, np.zeros((6, total)), 0
-    flights = []
-    for phase, control in zip(phases, controls, strict=True):
-        own = np.zeros((control.size, total))
-        own[:, first : first + control.size] = np.eye(control.size)
-        flight = _fly_phase(field, rotation_rate_rad_s, phase, state, slope, control, own)
-        flights.append(flight)
-        state, slope, first = flight.end, flight.end_slope, first + control.size
-    return flights
-
-
-def _fly_phase(
-    field: GravityField,
-    w: float,
-    phase: Phase,
-    start: FloatArray,
-    start_slope: FloatArray,
-    control: FloatArray,
-    control_slope: FloatArray,
-) -> PhaseFlight:
-    span, h, n = phase.span, phase.half_s, len(control)
-    once, twice = h * span.integral, h * h * span.integral @ span.integral
-    coast = h * (1.0 + span.nodes)
+    span, h, w = phase.span, phase.half_s, rotation_rate_rad_s
+    coast, once, far_coast, far_once = h * (1.0 + span.nodes), h * span.integral, 2.0 * h, h * span.weights
+    if backwards:
+        coast, once = coast - far_coast, once - far_once
+        far_coast, far_once = -far_coast, -far_once
+    twice = once @ once
     coriolis = np.array([[0.0, 2.0 * w, 0.0], [-2.0 * w, 0.0, 0.0], [0.0, 0.0, 0.0]])
     centrifugal = np.diag([w * w, w * w, 0.0])
+    n, r0, v0 = len(control_m_s2), anchor[:3], anchor[3:]
 
-    def states(a: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return start[:3] + coast[:, None] * start[3:] + twice @ a, start[3:] + once @ a
-
-    def matrix(pull: FloatArray) -> FloatArray:
-        """I minus the slope of the right-hand side with respect to the accelerations, (3n, 3n)."""
+    def matrix(r: FloatArray) -> FloatArray:
+        """I minus the slope of the right-hand side by the accelerations, (3n, 3n)."""
+        pull = gradients(field, r) + centrifugal
         blocks = pull[:, None] * twice[:, :, None, None] + coriolis * once[:, :, None, None]
         return np.eye(3 * n) - blocks.transpose(0, 2, 1, 3).reshape(3 * n, 3 * n)
 
-    a = control + accelerations(field, np.tile(start[:3], (n, 1)))
-    scale = np.abs(a).max() + 1e-300
+    a = control_m_s2 + accelerations(field, np.tile(r0, (n, 1)))
     for _ in range(_ROUNDS):
-        r, v = states(a)
-        pull = gradients(field, r) + centrifugal
-        rest = accelerations(field, r) + v @ coriolis.T + r @ centrifugal + control - a
-        step = np.linalg.solve(matrix(pull), rest.ravel()).reshape(n, 3)
+        r, v = r0 + coast[:, None] * v0 + twice @ a, v0 + once @ a
+        rest = accelerations(field, r) + v @ coriolis.T + r @ centrifugal + control_m_s2 - a
+        step = np.linalg.solve(matrix(r), rest.ravel()).reshape(n, 3)
         a = a + step
-        if not np.abs(step).max() > _SETTLED * scale:
+        if not np.abs(step).max() > _SETTLED * np.abs(a).max():
             break
-    r, v = states(a)
-    pull = gradients(field, r) + centrifugal
-    r_coast = start_slope[:3] + coast[:, None, None] * start_slope[3:]  # (n, 3, q)
-    forced = pull @ r_coast + coriolis @ start_slope[3:]
-    a_slope = np.linalg.solve(matrix(pull), forced.reshape(3 * n, -1) + control_slope).reshape(n, 3, -1)
-    r_slope = r_coast + np.tensordot(twice, a_slope, axes=1)
-    end_r, end_v = h * span.weights @ once, h * span.weights
-    end = np.concatenate([start[:3] + 2.0 * h * start[3:] + end_r @ a, start[3:] + end_v @ a])
-    end_slope = np.concatenate(
-        [
-            start_slope[:3] + 2.0 * h * start_slope[3:] + np.tensordot(end_r, a_slope, axes=1),
-            start_slope[3:] + np.tensordot(end_v, a_slope, axes=1),
-        ]
+    r = r0 + coast[:, None] * v0 + twice @ a
+    a_slope = np.linalg.inv(matrix(r)).reshape(n, 3, 3 * n)
+    far = np.concatenate([r0 + far_coast * v0 + far_once @ once @ a, v0 + far_once @ a])
+    far_slope = np.concatenate(
+        [np.tensordot(far_once @ once, a_slope, axes=1), np.tensordot(far_once, a_slope, axes=1)]
     )
-    return PhaseFlight(
-        np.concatenate([start[None, :3], r]),
-        np.concatenate([start[None, 3:], v]),
-        a,
-        np.concatenate([start_slope[None, :3], r_slope]),
-        end,
-        end_slope,
-    )
+    return PhaseFlight(r, np.tensordot(twice, a_slope, axes=1), far, far_slope)

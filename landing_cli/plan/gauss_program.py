@@ -1,17 +1,21 @@
-"""The pseudospectral planning problem as a cone program over the control at Legendre-Gauss nodes.
+"""The pseudospectral planning problem as a cone program on Legendre-Gauss nodes.
 
-Unknowns, scaled by the greatest thrust acceleration on the initial mass: the thrust acceleration u at the
-nodes of both phases, and bounds sigma >= |u| at the points of a finer Gauss rule. Thrust, clearance and cone
-are bound between the nodes as well: a polynomial that keeps a bound at its nodes may break it in between.
+Unknowns, scaled: the thrust acceleration u and the position at the nodes of both phases, and bounds
+sigma >= |u| at the points of a finer Gauss rule. That the positions are those which u flies is a smooth
+equality; thrust and cone are fixed cones, and the clearance is linearised. All are bound between the nodes as
+well: a polynomial that keeps a bound at its nodes may break it in between.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import block_diag
 
 from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.flight.legs import AccelerationLeg, GaussAccelerationLeg
@@ -22,14 +26,16 @@ from landing_cli.optimize.collocation import (
     legendre_gauss,
 )
 from landing_cli.optimize.cone_program import ConeBlock, ConeProgram, SmoothRows
-from landing_cli.plan.gauss_phases import Phase, PhaseFlight, fly_phases
+from landing_cli.plan.gauss_phases import Phase, PhaseFlight, fly_phase
 from landing_cli.plan.path_rows import path_rows
 from landing_cli.plan.records import CHECK_SAMPLES, Objective, PlanCase, TerminalConditions
 
 FloatArray = NDArray[np.float64]
 
-_BOUND_POINTS = 3  # points of the finer rule for each node
-_BUCKET = 10  # samples that share a row
+_BOUND_POINTS = 2  # points of the finer rule for each node
+_BUCKET = 40  # samples that share a row
+_REST = 1e-9  # weight of sigma where a bound has none: it has to rest on |u| there too
+_POSITION_REACH = 0.1  # of the chord from start to site, in a round at trust 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +76,19 @@ class GaussProblem:
         return tuple(len(phase.span.nodes) for phase in self.phases)
 
     @property
+    def node_times_s(self) -> FloatArray:
+        """Times of all nodes, (n,) s."""
+        return np.concatenate([phase.times_of(phase.span.nodes) for phase in self.phases])
+
+    @property
     def control_size(self) -> int:
-        """Unknowns that are control."""
+        """Unknowns that are control, and as many that are position."""
         return 3 * sum(self.node_counts)
 
     def controls(self, x: FloatArray) -> list[FloatArray]:
         """Return the scaled control at the nodes of each phase, (n, 3) each."""
         edges = 3 * np.cumsum([0, *self.node_counts])
-        return [x[a:b].reshape(-1, 3) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return [x[a:b].reshape(-1, 3) for a, b in pairwise(edges)]
 
     def legs(self, x: FloatArray) -> tuple[AccelerationLeg, ...]:
         """Return the control as legs that can be flown again."""
@@ -168,6 +179,93 @@ def _bounds(problem: GaussProblem) -> _Bounds:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _PathGrid:
+    """Positions: their scaling, and the path between the nodes.
+
+    Attributes
+    ----------
+    unit_m : (n,) float, m
+        Scale of the position at each node: the chord, and after the cone entry the height that one can be at.
+    weight_m : (s,) float, 1/m
+        Scale of the path bounds at each of `CHECK_SAMPLES` samples.
+    to_samples : (s, n) float
+    offset_m : (s, 3) float, m
+        The samples are at ``offset_m + to_samples @ positions at the nodes``.
+    chord_m : float, m
+        From the start to the site.
+    """
+
+    unit_m: FloatArray
+    weight_m: FloatArray
+    to_samples: FloatArray
+    offset_m: FloatArray
+    chord_m: float
+
+
+def _path_grid(problem: GaussProblem) -> _PathGrid:
+    case = problem.case
+    chord = float(np.linalg.norm(case.position_m - case.site.position_m))
+    times = np.linspace(0.0, case.tof_s, CHECK_SAMPLES)
+    to_samples, offset = _between_nodes(problem, times)
+    nodes = problem.node_times_s
+    unit, weight = np.full(len(nodes), chord), np.full(len(times), 1.0 / chord)
+    if problem.entry:
+        own = slice(problem.node_counts[0], None)
+        unit[own] = _height(problem, case.tof_s - nodes[own])
+        tail = slice(problem.entry, None)
+        weight[tail] = 0.1 / _height(problem, case.tof_s - times[tail] + 0.5 * (times[1] - times[0]))
+    return _PathGrid(unit, weight, to_samples, offset, chord)
+
+
+def _height(problem: GaussProblem, left_s: FloatArray) -> FloatArray:
+    """How far from the site one can be a time before touchdown: what keeps rows near the apex to scale."""
+    speed = float(np.linalg.norm(problem.case.landing_velocity_m_s))
+    return np.asarray(0.5 * problem.scale_m_s2 * left_s**2 + speed * left_s)
+
+
+def _between_nodes(problem: GaussProblem, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """From the positions at all nodes to those at times: matrix (m, n), and offset (m, 3).
+
+    The first phase interpolates through the start and its nodes, the second through its nodes and the site.
+    """
+    case, n = problem.case, problem.node_counts[0]
+    first = problem.phases[0]
+    matrix, offset = np.zeros((len(times), sum(problem.node_counts))), np.zeros((len(times), 3))
+    later = times >= first.end_s - 1e-9 * case.tof_s if problem.entry else np.zeros(len(times), dtype=bool)
+    rows = interpolation_matrix(first.span.support, first.points_of(times[~later]))
+    matrix[~later, :n], offset[~later] = rows[:, 1:], rows[:, :1] * case.position_m
+    if problem.entry:
+        last = problem.phases[1]
+        rows = interpolation_matrix(np.concatenate([last.span.nodes, [1.0]]), last.points_of(times[later]))
+        matrix[later, n:], offset[later] = rows[:, :-1], rows[:, -1:] * case.site.position_m
+    return matrix, offset
+
+
+def _flights(problem: GaussProblem, x: FloatArray) -> list[PhaseFlight]:
+    """Fly the first phase from the start and the second one back from the site."""
+    case = problem.case
+    field, w = case.asteroid.gravity, case.asteroid.rotation_rate_rad_s
+    start = np.concatenate([case.position_m, case.velocity_m_s])
+    end = np.concatenate([case.site.position_m, case.landing_velocity_m_s])
+    controls = [problem.scale_m_s2 * u for u in problem.controls(x)]
+    flights = [fly_phase(field, w, problem.phases[0], start, controls[0])]
+    if problem.entry:
+        flights.append(fly_phase(field, w, problem.phases[1], end, controls[1], backwards=True))
+    return flights
+
+
+def _meeting(problem: GaussProblem, flights: list[PhaseFlight]) -> tuple[FloatArray, FloatArray]:
+    """What the phases miss each other by, or one phase the landing: (6,), and by the control (6, q)."""
+    if problem.entry:
+        miss = flights[0].far - flights[1].far
+        return miss, np.concatenate([flights[0].far_slope, -flights[1].far_slope], axis=1)
+    case = problem.case
+    return flights[0].far - np.concatenate([case.site.position_m, case.landing_velocity_m_s]), flights[
+        0
+    ].far_slope
+
+
 def build_program(problem: GaussProblem) -> ConeProgram:
     """Write the problem as a cone program.
 
@@ -179,30 +277,58 @@ def build_program(problem: GaussProblem) -> ConeProgram:
     Returns
     -------
     ConeProgram
-        Over the control at the nodes, then sigma.
+        Over the control at the nodes, the positions there, then sigma.
     """
-    bounds = _bounds(problem)
+    bounds, grid = _bounds(problem), _path_grid(problem)
     q, m = problem.control_size, len(bounds.weights)
-    ball = sparse.lil_array((4 * m, q + m))
-    ball[np.arange(0, 4 * m, 4), q + np.arange(m)] = 1.0
-    triples = np.setdiff1d(np.arange(4 * m), np.arange(0, 4 * m, 4))
-    wide = sparse.lil_array((4 * m, q))
-    wide[triples] = bounds.control
-    ball = sparse.csr_array(ball) + sparse.hstack([sparse.csr_array(wide), sparse.csr_array((4 * m, m))])
-    blocks = [ConeBlock("second_order", sparse.csr_array(ball), np.zeros(4 * m), size=4)]
+    blocks = [_ball_block(q, bounds)]
     if problem.case.mass_model == "constant":
-        one = sparse.hstack([sparse.csr_array((m, q)), -sparse.eye_array(m)])
+        one = sparse.hstack([sparse.csr_array((m, 2 * q)), -sparse.eye_array(m)])
         blocks.append(ConeBlock("nonnegative", sparse.csr_array(one), bounds.share))
+    if problem.entry:
+        blocks.append(_cone_block(problem, grid, 2 * q + m))
     if problem.terminal == "paper":
-        blocks.append(_terminal_block(problem, q + m))
-    cost, quadratic = np.zeros(q + m), None
+        blocks.append(_terminal_block(problem, 2 * q + m))
+    cost, quadratic = np.zeros(2 * q + m), None
     if problem.objective == "fuel":
-        cost[q:] = bounds.weights + 1e-9  # the ends carry no weight, but sigma has to rest on |u| there too
+        cost[2 * q :] = bounds.weights + _REST
     else:
-        cost[q:] = 1e-9
-        quadratic = sparse.diags_array(np.concatenate([np.zeros(q), 2.0 * bounds.weights]))
-    reach = np.concatenate([np.ones(q), np.full(m, np.inf)])
-    return ConeProgram(cost, tuple(blocks), _smooth(problem, bounds), reach, quadratic)
+        cost[2 * q :] = _REST
+        quadratic = sparse.diags_array(np.concatenate([np.zeros(2 * q), 2.0 * bounds.weights]))
+    position_reach = np.where(grid.unit_m < grid.chord_m, np.inf, _POSITION_REACH)
+    reach = np.concatenate([np.full(q, np.inf), np.repeat(position_reach, 3), np.full(m, np.inf)])
+    return ConeProgram(cost, tuple(blocks), _smooth(problem, bounds, grid), reach, quadratic)
+
+
+def _ball_block(q: int, bounds: _Bounds) -> ConeBlock:
+    """|u| <= sigma at every point of the finer rule."""
+    m = len(bounds.weights)
+    spread = sparse.csr_array(sparse.kron(np.eye(m), np.eye(4, 3, -1)))  # (x, y, z) to (0, x, y, z)
+    first = sparse.csr_array(sparse.kron(np.eye(m), np.eye(4, 1)))
+    matrix = sparse.hstack([spread @ bounds.control, sparse.csr_array((4 * m, q)), first])
+    return ConeBlock("second_order", sparse.csr_array(matrix), np.zeros(4 * m), size=4)
+
+
+def _cone_block(problem: GaussProblem, grid: _PathGrid, width: int) -> ConeBlock:
+    """Keep the second phase in the safety cone (Lyu 2026, eq 3), at its start and two points a node."""
+    case, phase, q = problem.case, problem.phases[1], problem.control_size
+    points = np.concatenate([[-1.0], legendre_gauss(2 * problem.node_counts[1])[0]])
+    times = phase.times_of(points)
+    to_points, offset = _between_nodes(problem, times)
+    scale = 1.0 / _height(problem, case.tof_s - times)
+    face = np.vstack([case.site.normal / np.cos(case.cone_half_angle_rad), np.eye(3)])
+    rows = np.einsum("p,ca,pn,n->pcna", scale, face, to_points, grid.unit_m).reshape(4 * len(points), q)
+    constant = np.einsum("p,ca,pa->pc", scale, face, offset - case.site.position_m).ravel()
+    # each point's constant: positions are scaled about the site
+    constant += np.einsum("p,ca,pn,a->pc", scale, face, to_points, case.site.position_m).ravel()
+    matrix = sparse.hstack(
+        [
+            sparse.csr_array((len(rows), q)),
+            sparse.csr_array(rows),
+            sparse.csr_array((len(rows), width - 2 * q)),
+        ]
+    )
+    return ConeBlock("second_order", sparse.csr_array(matrix), constant, size=4)
 
 
 def _terminal_block(problem: GaussProblem, width: int) -> ConeBlock:
@@ -234,96 +360,78 @@ def _slope_at_end(nodes: FloatArray, end: FloatArray) -> FloatArray:
     return np.asarray(row[:-1] + row[-1] * end)
 
 
-def _smooth(problem: GaussProblem, bounds: _Bounds):  # noqa: ANN202
+def _smooth(problem: GaussProblem, bounds: _Bounds, grid: _PathGrid) -> Callable[[FloatArray], SmoothRows]:
+    """Write what is linearised: the positions that u flies, the landing, path bounds, the mass."""
     case, q, m = problem.case, problem.control_size, len(bounds.weights)
-    start = np.concatenate([case.position_m, case.velocity_m_s])
-    length = float(np.linalg.norm(case.position_m - case.site.position_m))
-    target = np.concatenate([case.site.position_m, case.landing_velocity_m_s])
-    unit = np.array([length] * 3 + [length / case.tof_s] * 3)
-    times = np.linspace(0.0, case.tof_s, CHECK_SAMPLES)
-    samples = _sample_maps(problem, times)
-    weight = _row_weights(problem, times, length)
-    ve = case.spacecraft.exhaust_velocity_m_s
-    rate = problem.scale_m_s2 * case.tof_s / ve
+    units = np.repeat(grid.unit_m, 3)
+    meeting_unit = np.repeat([grid.chord_m, grid.chord_m / case.tof_s], 3)
+    rate = problem.scale_m_s2 * case.tof_s / case.spacecraft.exhaust_velocity_m_s
 
     def smooth(x: FloatArray) -> SmoothRows:
-        controls = [problem.scale_m_s2 * u for u in problem.controls(x)]
-        flights = fly_phases(
-            case.asteroid.gravity, case.asteroid.rotation_rate_rad_s, start, problem.phases, controls
+        flights = _flights(problem, x)
+        positions = case.site.position_m + (units * x[q : 2 * q]).reshape(-1, 3)
+        flown = np.concatenate([flight.position_m for flight in flights])
+        miss, miss_slope = _meeting(problem, flights)
+        equality = np.concatenate([(positions - flown).ravel() / units, miss / meeting_unit])
+        by_control = block_diag(
+            *(flight.position_slope.reshape(-1, flight.far_slope.shape[1]) for flight in flights)
         )
-        miss = (flights[-1].end - target) / unit
-        miss_slope = problem.scale_m_s2 * flights[-1].end_slope / unit[:, None]
-        values, slopes = [np.zeros(0)], [np.zeros((0, q))]
-        if problem.entry:
-            positions = np.concatenate(
-                [rows @ flight.position_m for rows, flight in zip(samples, flights, strict=True)]
-            )
-            bound = path_rows(case, positions, problem.entry, _BUCKET, problem.margin_m)
-            values.append(weight[bound.sample] * bound.value)
-            by_position = _position_slopes(problem, samples, flights, bound.sample)
-            slope = np.einsum("ra,raq->rq", bound.slope, by_position)
-            slopes.append(problem.scale_m_s2 * weight[bound.sample, None] * slope)
-        inequality, inequality_slope = np.concatenate(values), np.concatenate(slopes)
-        padded = sparse.hstack([inequality_slope, sparse.csr_array((len(inequality), m))])
+        equality_slope = np.block(
+            [
+                [-problem.scale_m_s2 * by_control / units[:, None], np.eye(q)],
+                [problem.scale_m_s2 * miss_slope / meeting_unit[:, None], np.zeros((6, q))],
+            ]
+        )
+        value, slope = _path_bounds(problem, grid, positions)
+        inequality = sparse.hstack(
+            [sparse.csr_array((len(value), q)), slope, sparse.csr_array((len(value), m))]
+        )
         if case.mass_model == "variable":
-            lighter = bounds.share * np.exp(rate * (bounds.spent @ x[q:]))
-            room = lighter - x[q:]
-            room_slope = rate * lighter[:, None] * bounds.spent - np.eye(m)
-            inequality = np.concatenate([inequality, room])
-            padded = sparse.vstack([padded, sparse.hstack([sparse.csr_array((m, q)), room_slope])])
-        equality_slope = sparse.hstack([miss_slope, sparse.csr_array((6, m))])
-        return SmoothRows(miss, sparse.csr_array(equality_slope), inequality, sparse.csr_array(padded))
+            lighter = bounds.share * np.exp(rate * (bounds.spent @ x[2 * q :]))
+            lighter_slope = rate * lighter[:, None] * bounds.spent - np.eye(m)
+            value = np.concatenate([value, lighter - x[2 * q :]])
+            inequality = sparse.vstack(
+                [inequality, sparse.hstack([sparse.csr_array((m, 2 * q)), lighter_slope])]
+            )
+        padded = sparse.hstack([equality_slope, sparse.csr_array((q + 6, m))])
+        return SmoothRows(equality, sparse.csr_array(padded), value, sparse.csr_array(inequality))
 
     return smooth
 
 
-def _sample_maps(problem: GaussProblem, times: FloatArray) -> list[FloatArray]:
-    """From the positions on the support of each phase to the samples that belong to it."""
-    cuts = [0, *([problem.entry] if problem.entry else []), len(times)]
-    return [
-        interpolation_matrix(phase.span.support, phase.points_of(times[a:b]))
-        for phase, a, b in zip(problem.phases, cuts[:-1], cuts[1:], strict=True)
-    ]
+def _path_bounds(
+    problem: GaussProblem, grid: _PathGrid, positions_m: FloatArray
+) -> tuple[FloatArray, sparse.csr_array]:
+    """Clearance, cone and ground rows, and their slopes by the scaled positions at the nodes."""
+    q = problem.control_size
+    if not problem.entry:
+        return np.zeros(0), sparse.csr_array((0, q))
+    samples = grid.offset_m + grid.to_samples @ positions_m
+    rows = path_rows(problem.case, samples, problem.entry, _BUCKET, problem.margin_m, cone=False)
+    by_node = grid.weight_m[rows.sample, None] * grid.to_samples[rows.sample] * grid.unit_m
+    slope = (by_node[:, :, None] * rows.slope[:, None, :]).reshape(len(rows.value), q)
+    return grid.weight_m[rows.sample] * rows.value, sparse.csr_array(slope)
 
 
-def _position_slopes(
-    problem: GaussProblem, samples: list[FloatArray], flights: list[PhaseFlight], wanted: NDArray[np.int64]
-) -> FloatArray:
-    """Derivative of the wanted samples' positions with respect to the control, (r, 3, q)."""
-    inside = wanted >= problem.entry
-    slopes = np.zeros((len(wanted), 3, problem.control_size))
-    for own, rows, flight, first in zip((~inside, inside), samples, flights, (0, problem.entry), strict=True):
-        slopes[own] = np.tensordot(rows[wanted[own] - first], flight.position_slope, axes=1)
-    return slopes
-
-
-def _row_weights(problem: GaussProblem, times: FloatArray, length: float) -> FloatArray:
-    """Per metre of room: the chord before the entry; after it, how far half the thrust takes one in the time
-    to go, or the path would matter less and less towards the cone's apex."""
-    case = problem.case
-    left = case.tof_s - times
-    speed = float(np.linalg.norm(case.landing_velocity_m_s))
-    height = np.maximum(0.25 * problem.scale_m_s2 * left**2 + speed * left, 1e-9)
-    weight = np.full(len(times), 1.0 / length)
-    tail = slice(problem.entry, None)
-    weight[tail] = np.minimum(0.05 / height[tail], 1e3)
-    return weight
-
-
-def start_point(problem: GaussProblem, acceleration: FloatArray) -> FloatArray:
+def start_point(problem: GaussProblem, acceleration_m_s2: FloatArray) -> FloatArray:
     """Make the unknowns of a control.
 
     Parameters
     ----------
     problem : GaussProblem
         The problem.
-    acceleration : (n, 3) float, m/s2
+    acceleration_m_s2 : (n, 3) float, m/s2
         Thrust acceleration at all nodes, phase after phase.
 
     Returns
     -------
-    (q + m,) float
+    (2 q + m,) float
+        With the positions that it flies.
     """
-    control = (acceleration / problem.scale_m_s2).ravel()
+    case, grid = problem.case, _path_grid(problem)
+    control = (acceleration_m_s2 / problem.scale_m_s2).ravel()
+    flown = (
+        np.concatenate([flight.position_m for flight in _flights(problem, control)]) - case.site.position_m
+    )
     magnitude = np.linalg.norm((_bounds(problem).control @ control).reshape(-1, 3), axis=1)
-    return np.concatenate([control, magnitude])
+    return np.concatenate([control, (flown / grid.unit_m[:, None]).ravel(), magnitude])

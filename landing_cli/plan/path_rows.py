@@ -37,7 +37,15 @@ class PathRows:
     slope: FloatArray
 
 
-def path_rows(case: PlanCase, positions_m: FloatArray, entry: int, bucket: int, margin_m: float) -> PathRows:
+def path_rows(
+    case: PlanCase,
+    positions_m: FloatArray,
+    entry: int,
+    bucket: int,
+    margin_m: float,
+    *,
+    cone: bool = True,
+) -> PathRows:
     """Bound a sampled path.
 
     Parameters
@@ -52,6 +60,8 @@ def path_rows(case: PlanCase, positions_m: FloatArray, entry: int, bucket: int, 
         Samples that share a row.
     margin_m : float, m
         Added to the clearance.
+    cone : bool
+        Whether the cone is asked here; not where the caller keeps it as a cone.
 
     Returns
     -------
@@ -63,12 +73,12 @@ def path_rows(case: PlanCase, positions_m: FloatArray, entry: int, bucket: int, 
     clearance, direction = distance[before], slope[before]
     if case.clearance_metric == "vertices":
         clearance, direction = vertices_with_slopes(case.surface, positions_m[before])
-    room, inward = _cone_room(case, positions_m[after])
     groups = [
         _worst(before.start, clearance - case.clearance_m - margin_m, direction, bucket),
-        _worst(after.start, room, inward, bucket),
         _worst(after.start, distance[after], slope[after], bucket),
     ]
+    if cone:
+        groups.append(_worst(after.start, *_cone_room(case, positions_m[after]), bucket))
     return PathRows(*(np.concatenate([group[k] for group in groups]) for k in range(3)))
 
 

@@ -1,4 +1,4 @@
-"""A first path for methods that improve one: two cubics through a point above the site, bulged around the body."""
+"""A first path to improve: two cubics through a point above the site, bulged around the body."""
 
 from __future__ import annotations
 
