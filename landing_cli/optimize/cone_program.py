@@ -26,7 +26,7 @@ from typing import Literal
 import numpy as np
 
 from landing_cli.optimize.cone_records import ConeBlock, ConeProgram, FloatArray, SmoothRows, largest
-from landing_cli.optimize.cone_step import NO_POINT, ConvexStep, convex_step, no_cuts, with_cuts
+from landing_cli.optimize.cone_step import NO_POINT, ConvexStep, convex_step, no_cuts, stacked, with_cuts
 
 __all__ = ["ConeBlock", "ConeOptions", "ConeProgram", "ConeSolution", "SmoothRows", "solve_cone_program"]
 
@@ -112,6 +112,7 @@ def solve_cone_program(
     options = options or ConeOptions()
     x, rows = np.array(start, dtype=np.float64), program.smooth(start)
     held = _blocks_violation(program, x) <= 1e-6
+    fixed = stacked(program.blocks)
     trust, price, rounds, cuts = options.trust, options.price, 0, no_cuts(len(x))
     step = ConvexStep("", None, 0.0, 0.0, np.zeros(len(rows.equality)), np.zeros(len(rows.inequality)))
     tiny = 1e-9 * options.trust
@@ -121,7 +122,7 @@ def solve_cone_program(
         return ConeSolution(x, status, message, program.value(x), rows, *multipliers, rounds)
 
     while rounds < options.max_rounds:
-        step = convex_step(program, x, rows, cuts, trust, price)
+        step = convex_step(program, fixed, x, rows, cuts, trust, price)
         rounds += 1
         if step.x is None:
             if step.outcome in NO_POINT:

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from landing_cli.optimize.cone_records import ConeBlock, ConeProgram, FloatArray, Rows, SmoothRows, largest
+from landing_cli.optimize.cone_records import (
+    ConeBlock,
+    ConeKind,
+    ConeProgram,
+    FloatArray,
+    Rows,
+    SmoothRows,
+    largest,
+)
 
 SOLVED = ("Solved", "AlmostSolved")
 NO_POINT = ("PrimalInfeasible", "AlmostPrimalInfeasible")
@@ -47,8 +55,40 @@ class ConvexStep:
     inequality_multipliers: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """Blocks stacked for Clarabel: entries of their rows, offsets, and cones as (kind, rows, how many)."""
+
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    value: FloatArray
+    offset: FloatArray
+    cones: tuple[tuple[ConeKind, int, int], ...]
+
+
+def stacked(blocks: Sequence[ConeBlock]) -> Stack:
+    """Stack blocks, first on top; done once for the blocks that stay from round to round."""
+    rows, columns, values, cones, first = [], [], [], [], 0
+    for block in blocks:
+        entries, count = block.matrix.tocoo(), len(block.offset)
+        rows.append(entries.coords[0] + first)
+        columns.append(entries.coords[1])
+        values.append(entries.data)
+        size = block.size if block.kind == "second_order" else max(count, 1)
+        cones.append((block.kind, size, count // size))
+        first += count
+    offset = np.concatenate([block.offset for block in blocks])
+    return Stack(np.concatenate(rows), np.concatenate(columns), np.concatenate(values), offset, tuple(cones))
+
+
 def convex_step(
-    program: ConeProgram, x: FloatArray, rows: SmoothRows, cuts: Cuts, trust: float, price: float
+    program: ConeProgram,
+    fixed: Stack,
+    x: FloatArray,
+    rows: SmoothRows,
+    cuts: Cuts,
+    trust: float,
+    price: float,
 ) -> ConvexStep:
     """Solve the program linearised at a point, within a trust region, with elastic smooth rows.
 
@@ -56,6 +96,8 @@ def convex_step(
     ----------
     program : ConeProgram
         The scaled program.
+    fixed : Stack
+        Its blocks, stacked.
     x : (n,) float
         Point of linearisation.
     rows : SmoothRows
@@ -72,43 +114,49 @@ def convex_step(
     ConvexStep
         With the merit that the linearised program expects.
     """
+    p, near = len(rows.equality), _within_fall(rows, trust)
+    violations = (2 * p if program.elastic_equalities else 0) + len(near)
+    linear = stacked([*_linear_blocks(program, x, rows, near, cuts), *_trust_blocks(program.reach, x, trust)])
+    outcome, found, z = _clarabel(program, fixed, linear, np.full(violations, price))
+    multipliers = -z[:p], np.zeros(len(rows.inequality))
+    multipliers[1][near] = z[p : p + len(near)]
+    if outcome not in SOLVED:
+        return ConvexStep(outcome, None, np.inf, 0.0, *multipliers)
+    found = found[: len(x)]
+    f = rows.equality + rows.equality_slope @ (found - x)
+    g = rows.inequality + rows.inequality_slope @ (found - x)
+    np.minimum.at(g, cuts.row, cuts.offset + cuts.slope @ found)
+    expected = program.value(found) + price * replace(rows, equality=f, inequality=g).total
+    return ConvexStep(outcome, found, expected, largest(np.abs(found - x) / program.reach), *multipliers)
+
+
+def _clarabel(
+    program: ConeProgram, fixed: Stack, linear: Stack, prices: FloatArray
+) -> tuple[str, FloatArray, FloatArray]:
+    """Solve in (x, violations): how it ended, the unknowns, and the multipliers of the linear rows."""
     import clarabel
 
-    n, near = len(x), _within_fall(rows, trust)
-    broken = _violation_signs(program, len(rows.equality), len(near))
-    blocks = [
-        *program.blocks,
-        *_linear_blocks(x, rows, near, cuts, broken),
-        *_trust_blocks(program.reach, x, trust),
-    ]
-    width = n + broken.shape[1]
-    wide = [_widened(block, width) for block in blocks]
-    matrix = sparse.csc_array(-sparse.vstack([block.matrix for block in wide]))
-    offset = np.concatenate([block.offset for block in wide])
-    cost = np.concatenate([program.cost, np.full(width - n, price)])
+    m, width = len(fixed.offset), len(program.cost) + len(prices)
+    place = np.append(fixed.row, linear.row + m), np.append(fixed.column, linear.column)
+    offset = np.append(fixed.offset, linear.offset)
+    matrix = sparse.csc_array((-np.append(fixed.value, linear.value), place), shape=(len(offset), width))
     curved = sparse.csc_array((width, width))
     if program.quadratic is not None:
-        curved = sparse.csc_array(sparse.triu(_padded(program.quadratic, width)))
-    cones = [cone for block in wide for cone in _cones(clarabel, block)]
+        entries = sparse.triu(program.quadratic).tocoo()
+        curved = sparse.csc_array((entries.data, entries.coords), shape=(width, width))
+    make = {
+        "zero": clarabel.ZeroConeT,
+        "nonnegative": clarabel.NonnegativeConeT,
+        "second_order": clarabel.SecondOrderConeT,
+    }
+    cones = [make[kind](size) for kind, size, count in (*fixed.cones, *linear.cones) for _ in range(count)]
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = 1
     settings.presolve_enable = False
+    cost = np.append(program.cost, prices)
     solution = clarabel.DefaultSolver(curved, cost, matrix, offset, cones, settings).solve()
-    p, first = len(rows.equality), sum(len(block.offset) for block in program.blocks)
-    z = np.array(solution.z)
-    multipliers = -z[first : first + p], np.zeros(len(rows.inequality))
-    multipliers[1][near] = z[first + p : first + p + len(near)]
-    outcome = str(solution.status)
-    if outcome not in SOLVED:
-        return ConvexStep(outcome, None, np.inf, 0.0, *multipliers)
-    found = np.array(solution.x)[:n]
-    f = rows.equality + rows.equality_slope @ (found - x)
-    g = rows.inequality + rows.inequality_slope @ (found - x)
-    np.minimum.at(g, cuts.row, cuts.offset + cuts.slope @ found)
-    linear = replace(rows, equality=f, inequality=g)
-    length = largest(np.abs(found - x) / program.reach)
-    return ConvexStep(outcome, found, program.value(found) + price * linear.total, length, *multipliers)
+    return str(solution.status), np.array(solution.x), np.array(solution.z)[m:]
 
 
 def _within_fall(rows: SmoothRows, trust: float) -> NDArray[np.int64]:
@@ -116,13 +164,6 @@ def _within_fall(rows: SmoothRows, trust: float) -> NDArray[np.int64]:
     if rows.fall is None:
         return np.arange(len(rows.inequality))
     return np.flatnonzero(rows.inequality <= trust * rows.fall)
-
-
-def _violation_signs(program: ConeProgram, p: int, q: int) -> Rows:
-    """How the nonnegative violations enter the rows f (both signs, where elastic) and g."""
-    one = sparse.eye_array(p)
-    f = sparse.hstack([-one, one]) if program.elastic_equalities else sparse.csr_array((p, 0))
-    return sparse.csr_array(sparse.block_diag([f, sparse.eye_array(q)]))
 
 
 def no_cuts(n: int) -> Cuts:
@@ -142,50 +183,41 @@ def with_cuts(cuts: Cuts, x: FloatArray, rows: SmoothRows) -> Cuts:
 
 
 def _linear_blocks(
-    x: FloatArray, rows: SmoothRows, near: NDArray[np.int64], cuts: Cuts, broken: Rows
+    program: ConeProgram, x: FloatArray, rows: SmoothRows, near: NDArray[np.int64], cuts: Cuts
 ) -> list[ConeBlock]:
-    """Linearised rows in x and the violations: f, g, and the cuts, which share their rows' violations."""
-    p, n, extra = len(rows.equality), len(x), broken.shape[1]
+    """Linearised rows in x and the violations (f+, f-, g-): f = f+ - f-, g + g- >= 0.
+
+    Hard equalities have no f+ and f-. The cuts share the violations of their rows.
+    """
+    p, q, n = len(rows.equality), len(near), len(x)
+    elastic = 2 * p if program.elastic_equalities else 0
     place = np.full(len(rows.inequality), -1)
-    place[near] = np.arange(len(near))
+    place[near] = np.arange(q)
     kept = np.flatnonzero(place[cuts.row] >= 0)
     f, g = rows.equality_slope, rows.inequality_slope[near]
-    shared = broken[p + place[cuts.row[kept]]]
+    wide_f = _plus(_plus(f, np.arange(n, n + p), -1.0), np.arange(n + p, n + 2 * p)) if elastic else f
+    own, shared = n + elastic + np.arange(q), n + elastic + place[cuts.row[kept]]
     return [
-        ConeBlock("zero", sparse.hstack([f, broken[:p]]), rows.equality - f @ x),
-        ConeBlock("nonnegative", sparse.hstack([g, broken[p:]]), rows.inequality[near] - g @ x),
-        ConeBlock("nonnegative", sparse.hstack([cuts.slope[kept], shared]), cuts.offset[kept]),
-        ConeBlock("nonnegative", sparse.eye_array(extra, n + extra, k=n), np.zeros(extra)),
+        ConeBlock("zero", wide_f, rows.equality - f @ x),
+        ConeBlock("nonnegative", _plus(g, own), rows.inequality[near] - g @ x),
+        ConeBlock("nonnegative", _plus(cuts.slope[kept], shared), cuts.offset[kept]),
+        ConeBlock("nonnegative", sparse.eye_array(elastic + q, n + elastic + q, k=n), np.zeros(elastic + q)),
     ]
+
+
+def _plus(matrix: Rows, column: NDArray[np.int64], value: float = 1.0) -> Rows:
+    """Rows with one more entry each, in a column beyond."""
+    entries, count = matrix.tocoo(), len(column)
+    place = np.append(entries.coords[0], np.arange(count)), np.append(entries.coords[1], column)
+    shape = count, max(matrix.shape[1], int(column.max(initial=0)) + 1)
+    return sparse.coo_array((np.append(entries.data, np.full(count, value)), place), shape=shape)
 
 
 def _trust_blocks(reach: FloatArray, x: FloatArray, trust: float) -> list[ConeBlock]:
     limited = np.flatnonzero(np.isfinite(reach))
-    chosen = sparse.eye_array(len(x), format="csr")[limited]
-    radius = trust * reach[limited]
-    scale = sparse.diags_array(1.0 / radius)
+    radius, count = trust * reach[limited], len(limited)
+    inward = sparse.coo_array((1.0 / radius, (np.arange(count), limited)), shape=(count, len(x)))
     return [
-        ConeBlock("nonnegative", scale @ chosen, 1.0 - x[limited] / radius),
-        ConeBlock("nonnegative", -scale @ chosen, 1.0 + x[limited] / radius),
+        ConeBlock("nonnegative", inward, 1.0 - x[limited] / radius),
+        ConeBlock("nonnegative", -inward, 1.0 + x[limited] / radius),
     ]
-
-
-def _widened(block: ConeBlock, width: int) -> ConeBlock:
-    m, n = block.matrix.shape
-    if n == width:
-        return block
-    return replace(block, matrix=sparse.hstack([block.matrix, sparse.csr_array((m, width - n))]))
-
-
-def _padded(matrix: Rows, width: int) -> Rows:
-    rest = width - matrix.shape[0]
-    return sparse.block_diag([matrix, sparse.csr_array((rest, rest))])
-
-
-def _cones(clarabel: Any, block: ConeBlock) -> list[Any]:
-    m = len(block.offset)
-    if block.kind == "zero":
-        return [clarabel.ZeroConeT(m)]
-    if block.kind == "nonnegative":
-        return [clarabel.NonnegativeConeT(m)]
-    return [clarabel.SecondOrderConeT(block.size)] * (m // block.size)

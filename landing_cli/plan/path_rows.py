@@ -99,6 +99,6 @@ def _worst(
     """Worst sample of every bucket."""
     if not len(value):
         return np.zeros(0, dtype=np.int64), value, slope.reshape(0, 3)
-    starts = np.arange(0, len(value), bucket)
-    chosen = np.array([k + int(np.argmin(value[k : k + bucket])) for k in starts])
+    padded = np.append(value, np.full(-len(value) % bucket, np.inf)).reshape(-1, bucket)
+    chosen = np.argmin(padded, axis=1) + bucket * np.arange(len(padded))
     return first + chosen, value[chosen], slope[chosen]

@@ -1,0 +1,93 @@
+"""Search of the time at which the path enters the cone: one number outside the smooth program."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TypeVar
+
+from landing_cli.plan.records import PlanCase
+
+Answer = TypeVar("Answer")
+
+_FACTOR = 1.3
+_MOVES = 8  # a factor of 8 either way
+_REFINEMENTS = 2
+
+
+def first_time_to_go(case: PlanCase) -> float:
+    """Time to go at the cone entry with which a search begins, s: braking from h_min at full thrust.
+
+    Parameters
+    ----------
+    case : PlanCase
+        Clearance, thrust and mass.
+
+    Returns
+    -------
+    float, s
+        Twice the time in which the thrust alone crosses the clearance, between 2 % and half of the flight.
+    """
+    acceleration = case.spacecraft.thrust_max_n / case.spacecraft.mass_kg
+    fall = 2.0 * math.sqrt(max(case.clearance_m, 0.0) / acceleration)
+    return min(max(fall, 0.02 * case.tof_s), 0.5 * case.tof_s)
+
+
+def least_cost_time_to_go(
+    solve: Callable[[float], tuple[float, Answer]], first_s: float, longest_s: float
+) -> tuple[float, Answer, list[tuple[float, float]]]:
+    """Find the time to go at the cone entry that costs least, by steps downhill and parabolas.
+
+    Parameters
+    ----------
+    solve : callable
+        ``solve(time_to_go_s)`` gives a cost and an answer; called in the order of the search.
+    first_s : float, s
+        Where to begin.
+    longest_s : float, s
+        Not beyond this.
+
+    Returns
+    -------
+    time_to_go_s : float, s
+    answer
+        What ``solve`` gave there.
+    tried : list of (float, float)
+        Times to go, s, and their costs, in the order of the search.
+    """
+    answers: dict[float, tuple[float, Answer]] = {}
+
+    def cost(log_s: float) -> float:
+        if log_s not in answers:
+            answers[log_s] = solve(math.exp(log_s))
+        return answers[log_s][0]
+
+    step, top = math.log(_FACTOR), math.log(longest_s)
+    middle = min(math.log(first_s), top)
+    for _ in range(_MOVES):
+        below, above = middle - step, min(middle + step, top)
+        if cost(middle) <= min(cost(above), cost(below)):
+            break
+        middle = above if cost(above) < cost(below) else below
+    for _ in range(_REFINEMENTS):
+        place = sorted(answers).index(middle)
+        around = sorted(answers)[max(place - 1, 0) : place + 2]
+        if len(around) < 3:
+            break
+        lowest = _vertex(*around, *(cost(x) for x in around))
+        if min(abs(lowest - x) for x in around) < 0.05 * step:
+            break
+        if cost(lowest) < cost(middle):
+            middle = lowest
+    tried = [(math.exp(x), answer[0]) for x, answer in answers.items()]
+    return math.exp(middle), answers[middle][1], tried
+
+
+def _vertex(a: float, b: float, c: float, fa: float, fb: float, fc: float) -> float:
+    """Least point of the parabola through three points a < b < c, of which the middle one is lowest."""
+    left, right = (fb - fa) / (b - a), (fc - fb) / (c - b)
+    if right - left <= 0.0:
+        return b
+    slope_at_b = (left * (c - b) + right * (b - a)) / (c - a)
+    lowest = b - slope_at_b * (c - a) / (2.0 * (right - left))
+    return min(max(lowest, 0.5 * (a + b)), 0.5 * (b + c))

@@ -1,0 +1,100 @@
+"""Paths from which the successive convexification begins: out of the body, on either side of it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from landing_cli.body.clearance import signed_distances
+from landing_cli.plan.records import PlanCase
+
+FloatArray = NDArray[np.float64]
+
+_ROOM = 1.5  # starting paths keep this many clearances
+_GROWTH = 1.02
+_STEPS = 40  # of the largest radius, in which the other side is looked for
+_SIZES = 3
+
+
+def starting_paths(
+    case: PlanCase, times_s: FloatArray, path_m: FloatArray, entry_s: float
+) -> list[FloatArray]:
+    """Move a path out of the body, and find one that goes round it the other way.
+
+    Parameters
+    ----------
+    case : PlanCase
+        Surface and clearance.
+    times_s : (n,) float, s
+        Times of the path's points.
+    path_m : (n, 3) float, m, body frame
+        From the start to the site; may cross the body.
+    entry_s : float, s
+        The points from here on may be close to the ground.
+
+    Returns
+    -------
+    list of (n, 3) float, m
+        One path where the given one is clear already; else the given path pushed out along the radius and,
+        where there is one, a path that is bent to the other side. Both begin and end as the given one.
+    """
+    early = times_s < entry_s
+    early[0] = False
+    if _clear(case, path_m[early]).all():
+        return [path_m]
+    out = path_m.copy()
+    for _ in range(300):
+        low = early.copy()
+        low[early] = ~_clear(case, out[early])
+        if not low.any():
+            break
+        out[low] *= _GROWTH
+    other = _other_side(case, path_m, out, early)
+    return [out] if other is None else [out, other]
+
+
+def _clear(case: PlanCase, points: FloatArray) -> NDArray[np.bool_]:
+    return np.asarray(signed_distances(case.surface, points) >= _ROOM * case.clearance_m)
+
+
+def _other_side(
+    case: PlanCase, path: FloatArray, out: FloatArray, early: NDArray[np.bool_]
+) -> FloatArray | None:
+    """Bend a path away from the side to which it was pushed, until it is clear."""
+    chord = (path[-1] - path[0]) / np.linalg.norm(path[-1] - path[0])
+    pushed = (out - path).mean(axis=0)
+    aside = pushed - chord * (chord @ pushed)
+    if np.linalg.norm(aside) < 1e-6:
+        return None
+    share = np.linspace(0.0, 1.0, len(path))
+    bend = -((4.0 * share * (1.0 - share))[:, None] ** 2) * aside / np.linalg.norm(aside)
+    size = float(np.linalg.norm(case.asteroid.mesh.vertices, axis=1).max())
+    for amount in np.linspace(0.0, _SIZES * size, _SIZES * _STEPS + 1)[1:]:
+        bent = path + amount * bend
+        if _clear(case, bent[early]).all():
+            return np.asarray(bent)
+    return None
+
+
+def refined_times(times_s: FloatArray, values: FloatArray, count: int) -> FloatArray:
+    """Place nodes where a control changes: half of them by the change, half evenly.
+
+    Parameters
+    ----------
+    times_s : (n,) float, s
+        Nodes of a solution.
+    values : (n, 3) float
+        Its control.
+    count : int
+        How many nodes to place.
+
+    Returns
+    -------
+    (count,) float, s
+        From the first to the last of the given times.
+    """
+    length = np.diff(times_s)
+    change = np.linalg.norm(np.diff(values, axis=0), axis=1)
+    density = length / length.sum() + change / max(float(change.sum()), 1e-300)
+    reached = np.concatenate([[0.0], np.cumsum(density)])
+    return np.interp(np.linspace(0.0, reached[-1], count), reached, times_s)
