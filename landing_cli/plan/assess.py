@@ -42,7 +42,7 @@ class Measured:
     deepest, closest : int
         That sample, and the one closest to the surface before the entry.
     cone_angle_rad : (n,) float, rad
-        Angle from the touchdown between n_f and every sample.
+        Angle from the touchdown between n_f and every sample; 0 within `TOUCHDOWN_MISS_M` of it.
     entry : int
         First of the samples that lie in the cone up to touchdown.
     fuel_kg, delta_v_m_s, peak_thrust_n : float
@@ -215,7 +215,9 @@ def measure_trajectory(case: PlanCase, trajectory: Trajectory, delta_v_m_s: floa
     Measured
     """
     path, craft = trajectory.position_m, case.spacecraft
-    angle = _angles(path - path[-1], case.site.normal)
+    offset = path - path[-1]
+    angle = _angles(offset, case.site.normal)
+    angle[np.linalg.norm(offset, axis=1) < TOUCHDOWN_MISS_M] = 0.0  # closer than a miss that is forgiven
     outside = np.flatnonzero(angle[:-1] > case.cone_half_angle_rad + CONE_TOLERANCE_RAD)
     entry = int(outside[-1]) + 1 if len(outside) else 0
     before = max(entry, 1)
@@ -425,7 +427,7 @@ def _angles(offset: FloatArray, normal: FloatArray) -> FloatArray:
     """Angle between a normal and every offset, (n,) float, rad; 0 where there is no offset."""
     along = offset @ normal
     across = np.linalg.norm(offset - along[:, None] * normal, axis=1)
-    return np.asarray(np.arctan2(across, along))
+    return np.arctan2(across, along)
 
 
 def _landing_angle_deg(trajectory: Trajectory, normal: FloatArray) -> float:
