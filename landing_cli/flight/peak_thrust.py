@@ -163,11 +163,24 @@ def thrust_slope(curve: FlownCurve, tau: float) -> tuple[float, float]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _burnt(curve: FlownCurve, h: float, u: float, slope: float, after: float, next_slope: float) -> float:
+    """Velocity increment over a share h of the curve: trapezoidal, corrected by the rates at its ends.
+
+    The slopes hold ``u . u' - |u|^3 / ve``, so that ``d|u|/dt = slope / |u| + |u|^2 / ve``.
+    """
+    seconds = h * curve.duration
+    if u <= 0.0 or after <= 0.0:
+        return 0.5 * seconds * (u + after)
+    rate = slope / u + u * u / curve.exhaust_velocity
+    next_rate = next_slope / after + after * after / curve.exhaust_velocity
+    return 0.5 * seconds * (u + after) + seconds * seconds * (rate - next_rate) / 12.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _peak(curve: FlownCurve) -> tuple[float, float]:
     """Largest thrust over the initial mass, and the share of the curve where it is.
 
-    Every interval in which the slope turns from rising to falling holds a top, which is bisected. The
-    velocity increment so far, which tells the mass, is summed by the trapezoidal rule.
+    Every interval in which the slope turns from rising to falling holds a top, which is bisected.
     """
     h = 1.0 / _INTERVALS
     u, slope = thrust_slope(curve, 0.0)
@@ -184,12 +197,12 @@ def _peak(curve: FlownCurve) -> tuple[float, float]:
                     low = middle
                 else:
                     high = middle
-            top, _ = thrust_slope(curve, low)
-            burnt = spent + 0.5 * (u + top) * (low - i * h) * curve.duration
+            top, flat = thrust_slope(curve, low)
+            burnt = spent + _burnt(curve, low - i * h, u, slope, top, flat)
             level = top * math.exp(-burnt / curve.exhaust_velocity)
             if level > best:
                 best, where = level, low
-        spent += 0.5 * (u + after) * h * curve.duration
+        spent += _burnt(curve, h, u, slope, after, next_slope)
         u, slope = after, next_slope
     level = u * math.exp(-spent / curve.exhaust_velocity)
     return (level, 1.0) if level > best else (best, where)

@@ -19,7 +19,7 @@ from landing_cli.plan.records import PlanCase
 
 FloatArray = NDArray[np.float64]
 
-SHARE_NODES = 5
+SHARE_NODES = 4
 _TIME_NODES = 33
 
 

@@ -29,7 +29,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Objective = Literal["fuel", "peak"]
 
-_DEPARTURE_ERROR = 0.02
+_DEPARTURE_ERROR = 1e-3
 """Share by which an interpolated departure may misjudge a peak (tested): such candidates are not dropped."""
 
 
