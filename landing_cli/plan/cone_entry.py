@@ -3,16 +3,105 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from landing_cli.optimize.cone_program import ConeOptions, ConeProgram, ConeSolution, solve_cone_program
 from landing_cli.plan.records import PlanCase
 
 Answer = TypeVar("Answer")
 
+FloatArray = NDArray[np.float64]
+
 _FACTOR = 1.3
 _MOVES = 8  # a factor of 8 either way
 _REFINEMENTS = 2
+_PRICE = 10.0
+ROUGH = ConeOptions(progress_tol=3e-4, violation_tol=1e-5, price=_PRICE, price_max=_PRICE, max_rounds=25)
+FINE = ConeOptions(progress_tol=1e-5, violation_tol=3e-8, price=_PRICE, price_max=1e4)
+
+
+@dataclass(frozen=True, eq=False)
+class EntrySearch:
+    """What a search came to.
+
+    Attributes
+    ----------
+    entry_s : float, s
+        The cone entry of least cost.
+    solution : ConeSolution
+        Rough, with that entry.
+    starts_cost : list of float
+        Scaled cost from each start at the first entry, violations at a price included.
+    tried_s, tried_cost : list of float
+        Entries in the order of the search, and their costs.
+    rounds : int
+        Cone programs solved.
+    """
+
+    entry_s: float
+    solution: ConeSolution
+    starts_cost: list[float]
+    tried_s: list[float]
+    tried_cost: list[float]
+    rounds: int
+
+
+def search_cone_entry(
+    case: PlanCase,
+    program_of: Callable[[float], ConeProgram],
+    starts: Sequence[FloatArray],
+    first_s: float,
+) -> EntrySearch:
+    """Solve a landing roughly from every start, and from the best of them over the time of cone entry.
+
+    Parameters
+    ----------
+    case : PlanCase
+        Clearance, thrust and time of flight.
+    program_of : callable
+        ``program_of(entry_s)`` is the program with that entry; its unknowns keep their places.
+    starts : sequence of (m,) float
+        Scaled unknowns.
+    first_s : float, s
+        Time to go at the first entry.
+
+    Returns
+    -------
+    EntrySearch
+    """
+    rounds = 0
+    best: ConeSolution | None = None
+
+    def solve(time_to_go_s: float, start: FloatArray | None = None) -> tuple[float, ConeSolution]:
+        nonlocal best, rounds
+        if start is None:
+            assert best is not None  # every start has been solved
+            start = best.x
+        solution = solve_cone_program(program_of(case.tof_s - time_to_go_s), start, ROUGH)
+        rounds += solution.rounds
+        if best is None or _cost(solution) < _cost(best):
+            best = solution
+        return _cost(solution), solution
+
+    starts_cost = [solve(first_s, start)[0] for start in starts]
+    to_go, solution, tried = least_cost_time_to_go(solve, first_s, case.tof_s)
+    return EntrySearch(
+        case.tof_s - to_go,
+        solution,
+        starts_cost,
+        [case.tof_s - one for one, _ in tried],
+        [cost for _, cost in tried],
+        rounds,
+    )
+
+
+def _cost(solution: ConeSolution) -> float:
+    return solution.value + _PRICE * solution.rows.total
 
 
 def first_time_to_go(case: PlanCase) -> float:

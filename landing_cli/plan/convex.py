@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.flight.legs import LinearAccelerationLeg
-from landing_cli.optimize.cone_program import ConeOptions, ConeSolution, solve_cone_program
+from landing_cli.optimize.cone_program import ConeSolution, solve_cone_program
 from landing_cli.plan.assess import plan_of
-from landing_cli.plan.cone_entry import first_time_to_go, least_cost_time_to_go
+from landing_cli.plan.cone_entry import FINE, first_time_to_go, search_cone_entry
 from landing_cli.plan.free_flight import (
     EXCESS_TOLERANCE,
     SPENT,
@@ -23,18 +23,16 @@ from landing_cli.plan.free_flight import (
     free_flight_program,
     packed,
     unpacked,
+    verdict,
 )
-from landing_cli.plan.records import CHECK_SAMPLES, ConvexOptions, Parameter, Plan, PlanCase, PlanStatus
-from landing_cli.plan.starting_paths import refined_times, starting_paths
+from landing_cli.plan.records import CHECK_SAMPLES, ConvexOptions, Parameter, Plan, PlanCase
+from landing_cli.plan.starting_paths import boundary_cubic, refined_times, starting_paths
 
 FloatArray = NDArray[np.float64]
 
 _COARSE_NODES = 41
 _COARSE_SAMPLES = 401
 _BUCKET = 5
-_PRICE = 10.0
-_ROUGH = ConeOptions(progress_tol=3e-4, violation_tol=1e-5, price=_PRICE, price_max=_PRICE, max_rounds=25)
-_FINE = ConeOptions(progress_tol=1e-5, violation_tol=3e-8, price=_PRICE, price_max=1e4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +41,6 @@ class _Solved:
 
     flight: FreeFlight
     solution: ConeSolution
-
-    @property
-    def cost(self) -> float:
-        """Objective and priced violations."""
-        return self.solution.value + _PRICE * self.solution.rows.total
 
 
 def plan_convex(case: PlanCase, options: ConvexOptions | None = None) -> Plan:
@@ -69,31 +62,24 @@ def plan_convex(case: PlanCase, options: ConvexOptions | None = None) -> Plan:
     options = options or ConvexOptions()
     free = _without_terrain(case, options)
     if free.solution.x[-1] > EXCESS_TOLERANCE:
-        return _answer(free, options, {}, "even without terrain")
-    to_go = first_time_to_go(case)
-    starts = _from_either_side(free, case.tof_s - to_go)
-    best = min(starts, key=lambda solved: solved.cost)
-
-    def solve(time_to_go_s: float) -> tuple[float, _Solved]:
-        nonlocal best
-        solved = _solve(replace(best.flight, entry_s=case.tof_s - time_to_go_s), best, _ROUGH)
-        best = min(best, solved, key=lambda one: one.cost)
-        return solved.cost, solved
-
-    to_go, coarse, tried = least_cost_time_to_go(solve, to_go, case.tof_s)
-    _, thrust, _ = unpacked(coarse.flight, coarse.solution.x)
-    times = refined_times(coarse.flight.times_s, thrust, options.nodes)
-    fine = replace(coarse.flight, times_s=times, samples=CHECK_SAMPLES, bucket=_BUCKET)
-    solved = _solve(fine, coarse, _FINE)
-    rounds = free.solution.rounds + sum(one.solution.rounds for one in starts) + solved.solution.rounds
+        return _answer(free, options, {}, "even without terrain, ", free.solution.rounds)
+    starts = _either_side(free)
+    search = search_cone_entry(
+        case,
+        lambda entry_s: free_flight_program(replace(free.flight, entry_s=entry_s)),
+        starts,
+        first_time_to_go(case),
+    )
+    coarse = _Solved(replace(free.flight, entry_s=search.entry_s), search.solution)
+    solved = _refined(coarse, options.nodes)
     searched: dict[str, Parameter] = {
-        "cone_entry_bound_s": case.tof_s - to_go,
-        "cone_entries_tried_s": [case.tof_s - one for one, _ in tried],
-        "cone_entries_cost": [cost for _, cost in tried],
-        "starts_cost": [one.cost for one in starts],
+        "cone_entry_bound_s": search.entry_s,
+        "cone_entries_tried_s": search.tried_s,
+        "cone_entries_cost": search.tried_cost,
+        "starts_cost": search.starts_cost,
         "fuel_without_terrain_kg": _fuel_kg(free),
-        "rounds_last": solved.solution.rounds,
     }
+    rounds = free.solution.rounds + search.rounds + solved.solution.rounds
     return _answer(solved, options, searched, "", rounds)
 
 
@@ -101,42 +87,27 @@ def _without_terrain(case: PlanCase, options: ConvexOptions) -> _Solved:
     """The optimum with neither clearance nor cone, from a cubic: a lower bound, and a first path."""
     times = np.linspace(0.0, case.tof_s, _COARSE_NODES)
     flight = FreeFlight(case, times, np.inf, _COARSE_SAMPLES, 1, options.objective, options.terminal)
-    return _Solved(
-        flight, solve_cone_program(free_flight_program(flight), packed(flight, *_cubic(case, times)), _FINE)
-    )
+    start = packed(flight, boundary_cubic(case, times), np.zeros((_COARSE_NODES, 3)))
+    return _Solved(flight, solve_cone_program(free_flight_program(flight), start, FINE))
 
 
-def _cubic(case: PlanCase, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """States on the cubic between the boundary states, and no thrust."""
-    s, tof = (times_s / case.tof_s)[:, None], case.tof_s
-    r0, r1 = case.position_m, case.site.position_m
-    d0, d1 = tof * case.velocity_m_s, tof * case.landing_velocity_m_s
-    square, cubic = 3.0 * (r1 - r0) - 2.0 * d0 - d1, d0 + d1 - 2.0 * (r1 - r0)
-    r = r0 + s * (d0 + s * (square + s * cubic))
-    v = (d0 + s * (2.0 * square + 3.0 * s * cubic)) / tof
-    return np.concatenate([r, v], axis=1), np.zeros_like(r)
+def _either_side(free: _Solved) -> list[FloatArray]:
+    """Unknowns of the free path pushed out of the body, and bent to its other side."""
+    flight = free.flight
+    states, thrust, _ = unpacked(flight, free.solution.x)
+    paths = starting_paths(flight.case, flight.times_s, states[:, :3])
+    return [packed(flight, np.concatenate([path, states[:, 3:]], axis=1), thrust) for path in paths]
 
 
-def _from_either_side(free: _Solved, entry_s: float) -> list[_Solved]:
-    """Solve from the free path, pushed out of the body and bent to its other side."""
-    flight = replace(free.flight, entry_s=entry_s)
-    states, thrust, _ = unpacked(free.flight, free.solution.x)
-    solved = []
-    for path in starting_paths(flight.case, flight.times_s, states[:, :3], entry_s):
-        start = packed(flight, np.concatenate([path, states[:, 3:]], axis=1), thrust)
-        solved.append(_Solved(flight, solve_cone_program(free_flight_program(flight), start, _ROUGH)))
-    return solved
-
-
-def _solve(flight: FreeFlight, start: _Solved, options: ConeOptions) -> _Solved:
-    """Solve from the solution of another flight, interpolated to the nodes."""
-    states, thrust, _ = unpacked(start.flight, start.solution.x)
+def _refined(coarse: _Solved, nodes: int) -> _Solved:
+    """Place the nodes where the thrust changes, bind all samples, and solve to the end."""
+    states, thrust, _ = unpacked(coarse.flight, coarse.solution.x)
+    times = refined_times(coarse.flight.times_s, thrust, nodes)
+    flight = replace(coarse.flight, times_s=times, samples=CHECK_SAMPLES, bucket=_BUCKET)
     columns = np.concatenate([states, thrust], axis=1).T
-    at_nodes = np.stack(
-        [np.interp(flight.times_s, start.flight.times_s, column) for column in columns], axis=1
-    )
-    x = packed(flight, at_nodes[:, :6], at_nodes[:, 6:])
-    return _Solved(flight, solve_cone_program(free_flight_program(flight), x, options))
+    at_nodes = np.stack([np.interp(times, coarse.flight.times_s, column) for column in columns], axis=1)
+    start = packed(flight, at_nodes[:, :6], at_nodes[:, 6:])
+    return _Solved(flight, solve_cone_program(free_flight_program(flight), start, FINE))
 
 
 def _fuel_kg(solved: _Solved) -> float:
@@ -148,15 +119,12 @@ def _fuel_kg(solved: _Solved) -> float:
 
 
 def _answer(
-    solved: _Solved, options: ConvexOptions, searched: dict[str, Parameter], where: str, rounds: int = 0
+    solved: _Solved, options: ConvexOptions, searched: dict[str, Parameter], where: str, rounds: int
 ) -> Plan:
     """Fly the control again and tell what it keeps."""
     flight, solution = solved.flight, solved.solution
-    _, thrust, excess = unpacked(flight, solution.x)
-    status: PlanStatus = "unresolved" if solution.status == "unresolved" else "infeasible"
-    because = f"successive convexification: {solution.message}"
-    if excess > EXCESS_TOLERANCE and status == "infeasible":
-        because = " ".join(["the least thrust found is not enough", where]).strip()
+    _, thrust, _ = unpacked(flight, solution.x)
+    status, because = verdict(solution)
     parameters: dict[str, Parameter] = {
         "objective": options.objective,
         "terminal": options.terminal,
@@ -167,8 +135,8 @@ def _answer(
         flight.case,
         "convex",
         [LinearAccelerationLeg(flight.times_s, thrust)],
-        iterations=rounds or solution.rounds,
+        iterations=rounds,
         parameters=parameters,
         otherwise=status,
-        because=because,
+        because=f"{where}{because}",
     )

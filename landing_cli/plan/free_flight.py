@@ -19,9 +19,9 @@ from scipy import sparse
 
 from landing_cli.flight.dynamics import natural_acceleration
 from landing_cli.flight.linear_arcs import Arcs, fly_linear_arcs, positions_between, slopes_between
-from landing_cli.optimize.cone_program import ConeBlock, ConeProgram, SmoothRows
+from landing_cli.optimize.cone_program import ConeBlock, ConeProgram, ConeSolution, SmoothRows
 from landing_cli.plan.path_rows import path_rows
-from landing_cli.plan.records import Objective, PlanCase, TerminalConditions
+from landing_cli.plan.records import Objective, PlanCase, PlanStatus, TerminalConditions
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -152,6 +152,25 @@ def free_flight_program(flight: FreeFlight) -> ConeProgram:
     return ConeProgram(cost, blocks, lambda x: _smooth(flight, x), reach, quadratic, elastic_equalities=False)
 
 
+def verdict(solution: ConeSolution) -> tuple[PlanStatus, str]:
+    """Say what it means when a solution, flown again, breaks a constraint, and why it may.
+
+    Parameters
+    ----------
+    solution : ConeSolution
+        With the excess of the thrust as its last unknown.
+
+    Returns
+    -------
+    status : {"infeasible", "unresolved"}
+    because : str
+    """
+    if solution.status != "unresolved" and solution.x[-1] > EXCESS_TOLERANCE:
+        return "infeasible", "the least thrust found is not enough"
+    status: PlanStatus = "infeasible" if solution.status == "infeasible" else "unresolved"
+    return status, f"successive convexification: {solution.message}"
+
+
 def _shares(flight: FreeFlight) -> FloatArray:
     """Arcs' durations over t_f."""
     return np.diff(flight.times_s) / flight.case.tof_s
@@ -196,7 +215,7 @@ def _cone(flight: FreeFlight, pick: sparse.csr_array) -> list[ConeBlock]:
     if not np.isfinite(flight.entry_s):
         return []
     inside = np.flatnonzero(flight.times_s[:-1] >= flight.entry_s)
-    lift = _in_cone(case)
+    lift = cone_matrix(case)
     rows = sparse.kron(sparse.eye_array(len(inside)), lift, format="csr") @ pick[columns[inside, R].ravel()]
     site = lift @ case.site.position_m / flight.length_m
     blocks = [ConeBlock("second_order", rows, np.tile(-site, len(inside)), 4)]
@@ -208,7 +227,7 @@ def _cone(flight: FreeFlight, pick: sparse.csr_array) -> list[ConeBlock]:
     return blocks
 
 
-def _in_cone(case: PlanCase) -> FloatArray:
+def cone_matrix(case: PlanCase) -> FloatArray:
     """Matrix that takes an offset to the second-order cone: (n . d, cos(theta) d), (4, 3)."""
     angle = case.cone_half_angle_rad - CONE_MARGIN_RAD
     return np.concatenate([case.site.normal[None], np.cos(angle) * np.eye(3)])
@@ -261,7 +280,7 @@ def _smooth(flight: FreeFlight, x: FloatArray) -> SmoothRows:
     unit = np.concatenate([flight.unit, flight.unit[U]])
     slope = (arcs.end_slope * unit / flight.unit[:6, None]).reshape(-1, 12)
     own = columns[1:, :6].reshape(-1, 1)
-    gaps = _sparse_rows(
+    gaps = sparse_rows(
         np.concatenate([slope, -np.ones_like(own)], axis=1),
         np.concatenate([np.repeat(reached, 6, axis=0), own], axis=1),
         flight.unknowns,
@@ -291,7 +310,7 @@ def _path(
     )
     own = arc[rows.sample]
     slope = slopes_between(arcs, own, share[rows.sample], rows.slope) * unit / flight.length_m
-    return rows.value / flight.length_m, _sparse_rows(slope, reached[own], flight.unknowns)
+    return rows.value / flight.length_m, sparse_rows(slope, reached[own], flight.unknowns)
 
 
 def _mass(flight: FreeFlight, x: FloatArray, u: FloatArray) -> tuple[FloatArray, sparse.csr_array]:
@@ -327,7 +346,7 @@ def _spent(flight: FreeFlight, u: FloatArray) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(_shares(flight) * (0.5 * weight @ size))])
 
 
-def _sparse_rows(values: FloatArray, columns: IntArray, width: int) -> sparse.csr_array:
+def sparse_rows(values: FloatArray, columns: IntArray, width: int) -> sparse.csr_array:
     """Rows with values (k, c) at columns (k, c)."""
     k, c = values.shape
     return sparse.csr_array((values.ravel(), (np.repeat(np.arange(k), c), columns.ravel())), shape=(k, width))

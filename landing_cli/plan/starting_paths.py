@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.body.clearance import signed_distances
+from landing_cli.plan.cone_entry import first_time_to_go
 from landing_cli.plan.records import PlanCase
 
 FloatArray = NDArray[np.float64]
@@ -16,9 +17,17 @@ _STEPS = 40  # of the largest radius, in which the other side is looked for
 _SIZES = 3
 
 
-def starting_paths(
-    case: PlanCase, times_s: FloatArray, path_m: FloatArray, entry_s: float
-) -> list[FloatArray]:
+def boundary_cubic(case: PlanCase, times_s: FloatArray) -> FloatArray:
+    """States on the cubic between the boundary states: (n, 6) float, m, m/s, at times (n,) in s."""
+    s, tof = (times_s / case.tof_s)[:, None], case.tof_s
+    r0, r1 = case.position_m, case.site.position_m
+    d0, d1 = tof * case.velocity_m_s, tof * case.landing_velocity_m_s
+    square, cubic = 3.0 * (r1 - r0) - 2.0 * d0 - d1, d0 + d1 - 2.0 * (r1 - r0)
+    r = r0 + s * (d0 + s * (square + s * cubic))
+    return np.concatenate([r, (d0 + s * (2.0 * square + 3.0 * s * cubic)) / tof], axis=1)
+
+
+def starting_paths(case: PlanCase, times_s: FloatArray, path_m: FloatArray) -> list[FloatArray]:
     """Move a path out of the body, and find one that goes round it the other way.
 
     Parameters
@@ -29,8 +38,6 @@ def starting_paths(
         Times of the path's points.
     path_m : (n, 3) float, m, body frame
         From the start to the site; may cross the body.
-    entry_s : float, s
-        The points from here on may be close to the ground.
 
     Returns
     -------
@@ -38,7 +45,7 @@ def starting_paths(
         One path where the given one is clear already; else the given path pushed out along the radius and,
         where there is one, a path that is bent to the other side. Both begin and end as the given one.
     """
-    early = times_s < entry_s
+    early = times_s < case.tof_s - first_time_to_go(case)
     early[0] = False
     if _clear(case, path_m[early]).all():
         return [path_m]
