@@ -8,6 +8,7 @@ well: a polynomial that keeps a bound at its nodes may break it in between.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -34,7 +35,9 @@ FloatArray = NDArray[np.float64]
 
 _BOUND_POINTS = 2  # points of the finer rule for each node
 _BUCKET = 40  # samples that share a row
-_REST = 1e-9  # weight of sigma where a bound has none: it has to rest on |u| there too
+_VALUE = 10.0  # of the objective, against the price of a violation: fewest rounds on the nominal cases
+_REST = 1e-8  # weight of sigma where a bound has none: it has to rest on |u| there too
+_MARGIN_M = 0.01  # added to the clearance, for what the solver's tolerances leave
 _POSITION_REACH = 0.1  # of the chord from start to site, in a round at trust 1
 
 
@@ -53,8 +56,6 @@ class GaussProblem:
         Up to the cone entry, and after it.
     thrust_share : tuple of float
         Share of the greatest thrust that each phase may use at the points of the finer rule.
-    margin_m : float, m
-        Added to the clearance.
     """
 
     case: PlanCase
@@ -63,7 +64,6 @@ class GaussProblem:
     entry: int
     phases: tuple[Phase, ...]
     thrust_share: tuple[float, ...]
-    margin_m: float = 0.0
 
     @property
     def scale_m_s2(self) -> float:
@@ -285,16 +285,18 @@ def build_program(problem: GaussProblem) -> ConeProgram:
     if problem.case.mass_model == "constant":
         one = sparse.hstack([sparse.csr_array((m, 2 * q)), -sparse.eye_array(m)])
         blocks.append(ConeBlock("nonnegative", sparse.csr_array(one), bounds.share))
+    if problem.case.spacecraft.propellant_kg is not None:
+        blocks.append(_propellant_block(problem, bounds))
     if problem.entry:
         blocks.append(_cone_block(problem, grid, 2 * q + m))
     if problem.terminal == "paper":
         blocks.append(_terminal_block(problem, 2 * q + m))
     cost, quadratic = np.zeros(2 * q + m), None
     if problem.objective == "fuel":
-        cost[2 * q :] = bounds.weights + _REST
+        cost[2 * q :] = _VALUE * bounds.weights + _REST
     else:
         cost[2 * q :] = _REST
-        quadratic = sparse.diags_array(np.concatenate([np.zeros(2 * q), 2.0 * bounds.weights]))
+        quadratic = sparse.diags_array(np.concatenate([np.zeros(2 * q), 2.0 * _VALUE * bounds.weights]))
     position_reach = np.where(grid.unit_m < grid.chord_m, np.inf, _POSITION_REACH)
     reach = np.concatenate([np.full(q, np.inf), np.repeat(position_reach, 3), np.full(m, np.inf)])
     return ConeProgram(cost, tuple(blocks), _smooth(problem, bounds, grid), reach, quadratic)
@@ -307,6 +309,17 @@ def _ball_block(q: int, bounds: _Bounds) -> ConeBlock:
     first = sparse.csr_array(sparse.kron(np.eye(m), np.eye(4, 1)))
     matrix = sparse.hstack([spread @ bounds.control, sparse.csr_array((4 * m, q)), first])
     return ConeBlock("second_order", sparse.csr_array(matrix), np.zeros(4 * m), size=4)
+
+
+def _propellant_block(problem: GaussProblem, bounds: _Bounds) -> ConeBlock:
+    """Spend no more velocity increment than the propellant gives."""
+    case, q = problem.case, problem.control_size
+    craft = case.spacecraft
+    share = float(craft.propellant_kg or 0.0) / craft.mass_kg
+    ratio = share if case.mass_model == "constant" else -math.log1p(-min(share, 1.0 - 1e-9))
+    bound = craft.exhaust_velocity_m_s * ratio / (problem.scale_m_s2 * case.tof_s)
+    row = np.concatenate([np.zeros(2 * q), -bounds.weights])[None]
+    return ConeBlock("nonnegative", sparse.csr_array(row), np.array([bound]))
 
 
 def _cone_block(problem: GaussProblem, grid: _PathGrid, width: int) -> ConeBlock:
@@ -407,31 +420,42 @@ def _path_bounds(
     if not problem.entry:
         return np.zeros(0), sparse.csr_array((0, q))
     samples = grid.offset_m + grid.to_samples @ positions_m
-    rows = path_rows(problem.case, samples, problem.entry, _BUCKET, problem.margin_m, cone=False)
+    rows = path_rows(problem.case, samples, problem.entry, _BUCKET, _MARGIN_M, cone=False)
     by_node = grid.weight_m[rows.sample, None] * grid.to_samples[rows.sample] * grid.unit_m
     slope = (by_node[:, :, None] * rows.slope[:, None, :]).reshape(len(rows.value), q)
     return grid.weight_m[rows.sample] * rows.value, sparse.csr_array(slope)
 
 
-def start_point(problem: GaussProblem, acceleration_m_s2: FloatArray) -> FloatArray:
-    """Make the unknowns of a control.
+def start_point(problem: GaussProblem, acceleration_m_s2: FloatArray, positions_m: FloatArray) -> FloatArray:
+    """Make the unknowns of a control and a path, which need not agree.
 
     Parameters
     ----------
     problem : GaussProblem
         The problem.
-    acceleration_m_s2 : (n, 3) float, m/s2
+    acceleration_m_s2 : (n, 3) float, m/s2, rotating body frame
         Thrust acceleration at all nodes, phase after phase.
+    positions_m : (n, 3) float, m, body frame
+        Positions there.
 
     Returns
     -------
     (2 q + m,) float
-        With the positions that it flies.
     """
-    case, grid = problem.case, _path_grid(problem)
     control = (acceleration_m_s2 / problem.scale_m_s2).ravel()
-    flown = (
-        np.concatenate([flight.position_m for flight in _flights(problem, control)]) - case.site.position_m
-    )
+    offset = (positions_m - problem.case.site.position_m) / _path_grid(problem).unit_m[:, None]
     magnitude = np.linalg.norm((_bounds(problem).control @ control).reshape(-1, 3), axis=1)
-    return np.concatenate([control, (flown / grid.unit_m[:, None]).ravel(), magnitude])
+    return np.concatenate([control, offset.ravel(), magnitude])
+
+
+def node_positions(problem: GaussProblem, x: FloatArray) -> FloatArray:
+    """Return the positions at all nodes, (n, 3) float, m, of scaled unknowns."""
+    q, unit = problem.control_size, _path_grid(problem).unit_m[:, None]
+    return np.asarray(problem.case.site.position_m + unit * x[q : 2 * q].reshape(-1, 3))
+
+
+def velocity_increment_m_s(problem: GaussProblem, x: FloatArray) -> float:
+    """Return the integral of |u|, m/s, of scaled unknowns."""
+    bounds = _bounds(problem)
+    spent = bounds.weights @ x[2 * problem.control_size :]
+    return float(spent * problem.scale_m_s2 * problem.case.tof_s)
