@@ -148,4 +148,5 @@ def gauss_span(n: int) -> GaussSpan:
     nodes, weights = legendre_gauss(n)
     support = np.concatenate([[-1.0], nodes])
     derivative = differentiation_matrix(support)[1:]
-    return GaussSpan(nodes, weights, support, derivative, np.linalg.inv(derivative[:, 1:]))
+    integral = np.asarray(np.linalg.inv(derivative[:, 1:]), dtype=np.float64)
+    return GaussSpan(nodes, weights, support, derivative, integral)

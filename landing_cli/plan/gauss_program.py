@@ -35,8 +35,7 @@ FloatArray = NDArray[np.float64]
 
 _BOUND_POINTS = 2  # points of the finer rule for each node
 _BUCKET = 40  # samples that share a row
-_VALUE = 10.0  # of the objective, against the price of a violation: fewest rounds on the nominal cases
-_REST = 1e-8  # weight of sigma where a bound has none: it has to rest on |u| there too
+_REST = 1e-9  # weight of sigma where a bound has none: it has to rest on |u| there too
 _MARGIN_M = 0.01  # added to the clearance, for what the solver's tolerances leave
 _POSITION_REACH = 0.1  # of the chord from start to site, in a round at trust 1
 
@@ -293,10 +292,10 @@ def build_program(problem: GaussProblem) -> ConeProgram:
         blocks.append(_terminal_block(problem, 2 * q + m))
     cost, quadratic = np.zeros(2 * q + m), None
     if problem.objective == "fuel":
-        cost[2 * q :] = _VALUE * bounds.weights + _REST
+        cost[2 * q :] = bounds.weights + _REST
     else:
         cost[2 * q :] = _REST
-        quadratic = sparse.diags_array(np.concatenate([np.zeros(2 * q), 2.0 * _VALUE * bounds.weights]))
+        quadratic = sparse.diags_array(np.concatenate([np.zeros(2 * q), 2.0 * bounds.weights]))
     position_reach = np.where(grid.unit_m < grid.chord_m, np.inf, _POSITION_REACH)
     reach = np.concatenate([np.full(q, np.inf), np.repeat(position_reach, 3), np.full(m, np.inf)])
     return ConeProgram(cost, tuple(blocks), _smooth(problem, bounds, grid), reach, quadratic)

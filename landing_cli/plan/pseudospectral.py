@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.optimize.cone_program import ConeOptions, ConeSolution, solve_cone_program
+from landing_cli.optimize.cone_program import ConeSolution, solve_cone_program
 from landing_cli.plan.assess import THRUST_TOLERANCE, accelerations_at, measure, plan_of
-from landing_cli.plan.cone_entry import search_cone_entry
+from landing_cli.plan.cone_entry import FINE, first_time_to_go, search_cone_entry
 from landing_cli.plan.gauss_program import (
     GaussProblem,
     build_program,
@@ -39,7 +39,6 @@ FloatArray = NDArray[np.float64]
 _CONE_SHARE = 0.25  # of the nodes, inside the cone
 _CONE_NODES = 6  # at least
 _DRAWS = 6  # of the thrust bound
-_FINE = ConeOptions(progress_tol=1e-5, violation_tol=3e-8, price=10.0, price_max=1e4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +77,9 @@ def plan_pseudospectral(case: PlanCase, options: PseudospectralOptions | None = 
         entry = min(max(entry, 2), CHECK_SAMPLES - 2)
         return gauss_problem(case, options.objective, options.terminal, entry, nodes)
 
-    first = problem_at(0.95 * case.tof_s)
-    starts = _either_side(free, first)
-    search = search_cone_entry(case, lambda entry_s: build_program(problem_at(entry_s)), starts)
+    first_s = first_time_to_go(case)
+    starts = _either_side(free, problem_at(case.tof_s - first_s))
+    search = search_cone_entry(case, lambda entry_s: build_program(problem_at(entry_s)), starts, first_s)
     solved = _thrust_kept(problem_at(search.entry_s), search.solution.x)
     searched: dict[str, Parameter] = {
         "cone_entry_bound_s": solved.problem.phases[1].start_s,
@@ -128,7 +127,7 @@ def without_terrain(case: PlanCase, options: PseudospectralOptions) -> _Solved:
     problem = gauss_problem(case, options.objective, options.terminal, 0, (options.nodes,))
     path = boundary_cubic(case, problem.node_times_s)[:, :3]
     start = start_point(problem, np.zeros_like(path), path)
-    solution = solve_cone_program(build_program(problem), start, _FINE)
+    solution = solve_cone_program(build_program(problem), start, FINE)
     return _Solved(problem, solution, solution.rounds)
 
 
@@ -147,7 +146,7 @@ def _thrust_kept(problem: GaussProblem, x: FloatArray) -> _Solved:
     """Solve to the end, drawing the thrust bound in until the polynomial keeps it between points too."""
     rounds = 0
     for _ in range(_DRAWS):
-        solution = solve_cone_program(build_program(problem), x, _FINE)
+        solution = solve_cone_program(build_program(problem), x, FINE)
         rounds, x = rounds + solution.rounds, solution.x
         peaks = _peak_shares(problem, x)
         if solution.status == "unresolved" or max(peaks) <= 1.0 + 0.5 * THRUST_TOLERANCE:
