@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -34,9 +34,9 @@ from landing_cli.plan.records import CHECK_SAMPLES, Objective, PlanCase, Termina
 FloatArray = NDArray[np.float64]
 
 _BOUND_POINTS = 2  # points of the finer rule for each node
+_CONE_POINTS = 4  # at which the second phase lies in the cone, for each node
 _BUCKET = 40  # samples that share a row
 _REST = 1e-9  # weight of sigma where a bound has none: it has to rest on |u| there too
-_MARGIN_M = 0.01  # added to the clearance, for what the solver's tolerances leave
 _POSITION_REACH = 0.1  # of the chord from start to site, in a round at trust 1
 
 
@@ -55,6 +55,11 @@ class GaussProblem:
         Up to the cone entry, and after it.
     thrust_share : tuple of float
         Share of the greatest thrust that each phase may use at the points of the finer rule.
+    drift : (6,) float, m, m/s
+        By how much an integrator flies past the end of the first phase's polynomials: the second phase has
+        to begin there.
+    margin_m : float, m
+        Added to the clearance.
     """
 
     case: PlanCase
@@ -63,6 +68,8 @@ class GaussProblem:
     entry: int
     phases: tuple[Phase, ...]
     thrust_share: tuple[float, ...]
+    drift: FloatArray = field(default_factory=lambda: np.zeros(6))
+    margin_m: float = 0.01  # more than the solver's tolerances leave
 
     @property
     def scale_m_s2(self) -> float:
@@ -241,23 +248,36 @@ def _between_nodes(problem: GaussProblem, times: FloatArray) -> tuple[FloatArray
     return matrix, offset
 
 
-def _flights(problem: GaussProblem, x: FloatArray) -> list[PhaseFlight]:
-    """Fly the first phase from the start and the second one back from the site."""
+def phase_flights(problem: GaussProblem, x: FloatArray) -> list[PhaseFlight]:
+    """Fly the first phase from the start and the second one back from the site.
+
+    Parameters
+    ----------
+    problem : GaussProblem
+        The problem.
+    x : (2 q + m,) float
+        Scaled unknowns.
+
+    Returns
+    -------
+    list of PhaseFlight
+        One for each phase.
+    """
     case = problem.case
-    field, w = case.asteroid.gravity, case.asteroid.rotation_rate_rad_s
+    gravity, w = case.asteroid.gravity, case.asteroid.rotation_rate_rad_s
     start = np.concatenate([case.position_m, case.velocity_m_s])
     end = np.concatenate([case.site.position_m, case.landing_velocity_m_s])
     controls = [problem.scale_m_s2 * u for u in problem.controls(x)]
-    flights = [fly_phase(field, w, problem.phases[0], start, controls[0])]
+    flights = [fly_phase(gravity, w, problem.phases[0], start, controls[0])]
     if problem.entry:
-        flights.append(fly_phase(field, w, problem.phases[1], end, controls[1], backwards=True))
+        flights.append(fly_phase(gravity, w, problem.phases[1], end, controls[1], backwards=True))
     return flights
 
 
 def _meeting(problem: GaussProblem, flights: list[PhaseFlight]) -> tuple[FloatArray, FloatArray]:
     """What the phases miss each other by, or one phase the landing: (6,), and by the control (6, q)."""
     if problem.entry:
-        miss = flights[0].far - flights[1].far
+        miss = flights[0].far + problem.drift - flights[1].far
         return miss, np.concatenate([flights[0].far_slope, -flights[1].far_slope], axis=1)
     case = problem.case
     return flights[0].far - np.concatenate([case.site.position_m, case.landing_velocity_m_s]), flights[
@@ -322,9 +342,9 @@ def _propellant_block(problem: GaussProblem, bounds: _Bounds) -> ConeBlock:
 
 
 def _cone_block(problem: GaussProblem, grid: _PathGrid, width: int) -> ConeBlock:
-    """Keep the second phase in the safety cone (Lyu 2026, eq 3), at its start and two points a node."""
+    """Keep the second phase in the safety cone (Lyu 2026, eq 3), at its start and between all nodes."""
     case, phase, q = problem.case, problem.phases[1], problem.control_size
-    points = np.concatenate([[-1.0], legendre_gauss(2 * problem.node_counts[1])[0]])
+    points = np.concatenate([[-1.0], legendre_gauss(_CONE_POINTS * problem.node_counts[1])[0]])
     times = phase.times_of(points)
     to_points, offset = _between_nodes(problem, times)
     scale = 1.0 / _height(problem, case.tof_s - times)
@@ -380,7 +400,7 @@ def _smooth(problem: GaussProblem, bounds: _Bounds, grid: _PathGrid) -> Callable
     rate = problem.scale_m_s2 * case.tof_s / case.spacecraft.exhaust_velocity_m_s
 
     def smooth(x: FloatArray) -> SmoothRows:
-        flights = _flights(problem, x)
+        flights = phase_flights(problem, x)
         positions = case.site.position_m + (units * x[q : 2 * q]).reshape(-1, 3)
         flown = np.concatenate([flight.position_m for flight in flights])
         miss, miss_slope = _meeting(problem, flights)
@@ -419,7 +439,7 @@ def _path_bounds(
     if not problem.entry:
         return np.zeros(0), sparse.csr_array((0, q))
     samples = grid.offset_m + grid.to_samples @ positions_m
-    rows = path_rows(problem.case, samples, problem.entry, _BUCKET, _MARGIN_M, cone=False)
+    rows = path_rows(problem.case, samples, problem.entry, _BUCKET, problem.margin_m, cone=False)
     by_node = grid.weight_m[rows.sample, None] * grid.to_samples[rows.sample] * grid.unit_m
     slope = (by_node[:, :, None] * rows.slope[:, None, :]).reshape(len(rows.value), q)
     return grid.weight_m[rows.sample] * rows.value, sparse.csr_array(slope)

@@ -2,8 +2,8 @@
 
 Two phases, up to the cone entry and inside the safety cone, each with one polynomial per state on
 Legendre-Gauss nodes (Benson 2005). What happens between nodes is not trusted: thrust, clearance and cone are
-bound there too, the thrust bound is drawn in until the control polynomial keeps it everywhere, and the
-control is flown again by an integrator before a path is called planned.
+bound there too, and the control is flown by an integrator, whose peak thrust and touchdown correct the
+problem until it lands.
 """
 
 from __future__ import annotations
@@ -13,14 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.flight.trajectory import Trajectory
 from landing_cli.optimize.cone_program import ConeSolution, solve_cone_program
-from landing_cli.plan.assess import THRUST_TOLERANCE, accelerations_at, measure, plan_of
+from landing_cli.plan.assess import Measured, accelerations_at, broken_constraints, measure, no_plan, plan_of
 from landing_cli.plan.cone_entry import FINE, first_time_to_go, search_cone_entry
 from landing_cli.plan.gauss_program import (
     GaussProblem,
     build_program,
     gauss_problem,
     node_positions,
+    phase_flights,
     start_point,
     velocity_increment_m_s,
 )
@@ -36,9 +38,13 @@ from landing_cli.plan.starting_paths import boundary_cubic, starting_paths
 
 FloatArray = NDArray[np.float64]
 
+METHOD = "pseudospectral"
+
 _CONE_SHARE = 0.25  # of the nodes, inside the cone
 _CONE_NODES = 6  # at least
-_DRAWS = 6  # of the thrust bound
+_CORRECTIONS = 10  # of thrust bound, drift and clearance
+_DRAW = 1.5  # power of the excess by which the bound is drawn in: the peak grows back by some of it
+_DOUBLINGS = 5  # of the thrust, in which one is looked for that suffices
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +75,9 @@ def plan_pseudospectral(case: PlanCase, options: PseudospectralOptions | None = 
     options = options or PseudospectralOptions()
     free = without_terrain(case, options)
     if free.solution.status == "infeasible":
-        return _answer(free, options, {}, "even without terrain the thrust does not suffice", free.rounds)
+        parameters = _choices(free.problem, options)
+        why = _too_weak(free)
+        return no_plan(case, METHOD, "infeasible", why, iterations=free.rounds, parameters=parameters)
     nodes = phase_nodes(options.nodes)
 
     def problem_at(entry_s: float) -> GaussProblem:
@@ -80,7 +88,7 @@ def plan_pseudospectral(case: PlanCase, options: PseudospectralOptions | None = 
     first_s = first_time_to_go(case)
     starts = _either_side(free, problem_at(case.tof_s - first_s))
     search = search_cone_entry(case, lambda entry_s: build_program(problem_at(entry_s)), starts, first_s)
-    solved = _thrust_kept(problem_at(search.entry_s), search.solution.x)
+    solved = _as_flown(problem_at(search.entry_s), search.solution.x)
     searched: dict[str, Parameter] = {
         "cone_entry_bound_s": solved.problem.phases[1].start_s,
         "cone_entries_tried_s": search.tried_s,
@@ -89,7 +97,7 @@ def plan_pseudospectral(case: PlanCase, options: PseudospectralOptions | None = 
         "delta_v_without_terrain_m_s": velocity_increment_m_s(free.problem, free.solution.x),
         "thrust_share": list(solved.problem.thrust_share),
     }
-    return _answer(solved, options, searched, "", free.rounds + search.rounds + solved.rounds)
+    return _answer(solved, options, searched, free.rounds + search.rounds + solved.rounds)
 
 
 def phase_nodes(nodes: int) -> tuple[int, int]:
@@ -142,50 +150,93 @@ def _either_side(free: _Solved, problem: GaussProblem) -> list[FloatArray]:
     return [start_point(problem, control, one) for one in starting_paths(case, times, at_nodes)]
 
 
-def _thrust_kept(problem: GaussProblem, x: FloatArray) -> _Solved:
-    """Solve to the end, drawing the thrust bound in until the polynomial keeps it between points too."""
-    rounds = 0
-    for _ in range(_DRAWS):
+def _as_flown(problem: GaussProblem, x: FloatArray) -> _Solved:
+    """Solve to the end, so that the control keeps its constraints when an integrator flies it.
+
+    Between the points the control polynomial exceeds its bound, and the integrator leaves the state
+    polynomials by what these do not resolve: the bound is drawn in, the second phase moved and the clearance
+    raised by as much.
+    """
+    case, rounds = problem.case, 0
+    for _ in range(_CORRECTIONS):
         solution = solve_cone_program(build_program(problem), x, FINE)
         rounds, x = rounds + solution.rounds, solution.x
-        peaks = _peak_shares(problem, x)
-        if solution.status == "unresolved" or max(peaks) <= 1.0 + 0.5 * THRUST_TOLERANCE:
+        measured = measure(case, problem.legs(x))
+        if solution.status != "converged" or not broken_constraints(case, measured):
             break
+        flown, peaks = measured.trajectory, _peak_shares(problem, measured.trajectory)
         shares = zip(problem.thrust_share, peaks, strict=True)
-        problem = replace(problem, thrust_share=tuple(share / max(peak, 1.0) for share, peak in shares))
+        problem = replace(
+            problem,
+            thrust_share=tuple(share / max(peak, 1.0) ** _DRAW for share, peak in shares),
+            drift=_at_entry(problem, flown) - phase_flights(problem, x)[0].far,
+            margin_m=problem.margin_m + max(case.clearance_m - _clearance_m(case, measured), 0.0),
+        )
     return _Solved(problem, solution, rounds)
 
 
-def _peak_shares(problem: GaussProblem, x: FloatArray) -> list[float]:
+def _peak_shares(problem: GaussProblem, flown: Trajectory) -> list[float]:
     """Greatest thrust of each phase at the samples, over the thruster's."""
-    thrust = np.linalg.norm(measure(problem.case, problem.legs(x)).trajectory.thrust_n, axis=1)
-    shares = thrust / problem.case.spacecraft.thrust_max_n
+    shares = np.linalg.norm(flown.thrust_n, axis=1) / problem.case.spacecraft.thrust_max_n
     return [float(part.max()) for part in np.split(shares, [problem.entry])]
 
 
-def _answer(
-    solved: _Solved,
-    options: PseudospectralOptions,
-    searched: dict[str, Parameter],
-    because: str,
-    rounds: int,
-) -> Plan:
-    """Fly the control again and tell what it keeps."""
-    problem, solution = solved.problem, solved.solution
-    status: PlanStatus = "infeasible" if solution.status == "infeasible" else "unresolved"
-    parameters: dict[str, Parameter] = {
+def _clearance_m(case: PlanCase, measured: Measured) -> float:
+    by_surface = case.clearance_metric == "surface"
+    return measured.clearance_surface_m if by_surface else measured.clearance_vertices_m
+
+
+def _at_entry(problem: GaussProblem, flown: Trajectory) -> FloatArray:
+    return np.concatenate([flown.position_m[problem.entry], flown.velocity_m_s[problem.entry]])
+
+
+def _too_weak(free: _Solved) -> str:
+    """Say how much thrust the site would take without terrain and cone."""
+    case, share = free.problem.case, 1.0
+
+    def reaches(share: float) -> bool:
+        problem = replace(free.problem, thrust_share=(share,))
+        return solve_cone_program(build_program(problem), free.solution.x, FINE).status == "converged"
+
+    bound = case.spacecraft.thrust_max_n
+    low = 1.0
+    for _ in range(_DOUBLINGS):
+        share = 2.0 * low
+        if reaches(share):
+            break
+        low = share
+    else:
+        return f"even without terrain {share * bound:.0f} N do not suffice in {case.tof_s:.6g} s"
+    while share > 1.01 * low:
+        middle = float(np.sqrt(share * low))
+        low, share = (low, middle) if reaches(middle) else (middle, share)
+    return (
+        f"even without terrain it takes {share * bound:.3g} N to land in {case.tof_s:.6g} s; "
+        f"the thruster gives {bound:g} N"
+    )
+
+
+def _choices(problem: GaussProblem, options: PseudospectralOptions) -> dict[str, Parameter]:
+    return {
         "objective": options.objective,
         "terminal": options.terminal,
         "nodes": options.nodes,
         "phase_nodes": [float(n) for n in problem.node_counts],
-        **searched,
     }
+
+
+def _answer(
+    solved: _Solved, options: PseudospectralOptions, searched: dict[str, Parameter], rounds: int
+) -> Plan:
+    """Fly the control again and tell what it keeps."""
+    problem, solution = solved.problem, solved.solution
+    status: PlanStatus = "infeasible" if solution.status == "infeasible" else "unresolved"
     return plan_of(
         problem.case,
-        "pseudospectral",
+        METHOD,
         problem.legs(solution.x),
         iterations=rounds,
-        parameters=parameters,
+        parameters={**_choices(problem, options), **searched},
         otherwise=status,
-        because=because or f"successive convexification: {solution.message}",
+        because=f"successive convexification: {solution.message}",
     )
