@@ -278,6 +278,9 @@ def _carry_out(
     voice = console.Console(way.quiet)
     request = request_of_source(f"plan {command}", source, voice)
     tasks = tasks_of(request)
+    plan = request.loaded.scenario.plan
+    if plan is not None and plan.clearance_m == "auto":
+        voice.say(f"clearance_m: auto is {tasks[0].case.clearance_m:.4g} m, 1 % of the body's length")
     name = f"{request.loaded.scenario.name}-plan-{command.split()[0]}.h5"
     path = way.output or Path("runs") / name
     if way.dry_run:

@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 # steps of the order-8 integrator (tested: halving them moves a landing by less than 1e-7 m)
 _BEZIER_STEPS = 128
 _STEPS_PER_INTERVAL = 4
-_STEPS_PER_GAUSS_NODE = 2
+_STEPS_PER_GAUSS_NODE = 8  # thrust that falls to nothing leaves kinks in the flow
 
 
 @singledispatch

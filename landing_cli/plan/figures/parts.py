@@ -42,7 +42,7 @@ GUIDE: Mapping[str, Any] = {
 TANGENT: Mapping[str, Any] = {"marker": "x", "color": plotting.PURPLE, "linestyle": "none", "markersize": 6}
 LIMIT: Mapping[str, Any] = {"color": plotting.RED, "lw": 1.0, "ls": (0, (4, 2))}
 
-_COLOURS = (plotting.BLUE, plotting.RED, plotting.GREEN, plotting.ORANGE, plotting.PURPLE, plotting.SKY)
+_COLOURS = (plotting.BLUE, plotting.GREEN, plotting.ORANGE, plotting.PURPLE, plotting.SKY, plotting.DARK_GREY)
 _SAMPLES = 500
 
 METHODS = {

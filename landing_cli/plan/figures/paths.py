@@ -152,6 +152,6 @@ def _explain(figure: Figure, entries: Sequence[PlanEntry]) -> None:
     figure.legend(
         handles=handles,
         loc="lower center",
-        ncols=min(8 if len(handles) > 12 else 6, len(handles)),
+        ncols=min(8 if is_sweep(entries) else 5, len(handles)),
         bbox_to_anchor=(0.52, 0.005),
     )
