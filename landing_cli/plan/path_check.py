@@ -80,9 +80,8 @@ def check_path(
     slack, kx, ky, kz = -1.0, 0.0, 0.0, 0.0
     for k in range(path.shape[0] - 1, -1, -1):
         x, y, z = path[k, 0], path[k, 1], path[k, 2]
-        if k == entry - 1:
-            slack = -1.0  # from here on more is asked
-        elif slack > 0.0 and (x - kx) ** 2 + (y - ky) ** 2 + (z - kz) ** 2 <= slack * slack:
+        far = (x - kx) ** 2 + (y - ky) ** 2 + (z - kz) ** 2 > slack * slack
+        if slack > 0.0 and not far and k != entry - 1:  # before the entry more is asked than after it
             continue
         measured += 1
         distance, slot = signed_distance_from(surface, x, y, z, slot)
