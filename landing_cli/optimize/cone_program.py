@@ -48,7 +48,7 @@ class ConeOptions:
     violation_tol : float
         Largest violation of a smooth row at convergence.
     progress_tol : float
-        Converged when the merit is expected to fall by less than this share of the objective.
+        Settled when the merit is expected to fall by less than this share.
     max_rounds : int
     """
 
@@ -138,7 +138,7 @@ def solve_cone_program(
         merit = program.value(x) + price * rows.total
         expected = merit - step.expected
         achieved = merit - program.value(step.x) - price * candidate.total
-        settled = held and expected <= options.progress_tol * (abs(program.value(x)) + 1e-3)
+        settled = held and expected <= options.progress_tol * (abs(merit) + 1e-3)
         accepted = not held or achieved > 0.05 * expected or (settled and candidate.total < rows.total)
         if accepted:
             x, rows, held, cuts = step.x, candidate, True, no_cuts(len(x))

@@ -12,7 +12,7 @@ from landing_cli.flight.bezier_curve import bezier_basis
 from landing_cli.flight.legs import BezierLeg
 from landing_cli.optimize.cone_program import ConeSolution, solve_cone_program
 from landing_cli.plan.assess import plan_of, sampled_flight
-from landing_cli.plan.cone_entry import FINE, first_time_to_go, search_cone_entry
+from landing_cli.plan.cone_entry import FINE, first_time_to_go, search_case, search_cone_entry
 from landing_cli.plan.free_flight import EXCESS_TOLERANCE, verdict
 from landing_cli.plan.free_guides import FreeGuides, control_points, free_guides_program, guides_through
 from landing_cli.plan.records import CHECK_SAMPLES, FreeGuidesOptions, Parameter, Plan, PlanCase
@@ -27,6 +27,7 @@ _COARSE_SAMPLES = 81
 _COARSE_PATH_SAMPLES = 401
 _BUCKET = 5
 _THRUST_ROUNDS = 4
+_ROOM = 1.0 - 1e-5
 
 
 def plan_bezier_free_guides(case: PlanCase, options: FreeGuidesOptions | None = None) -> Plan:
@@ -56,17 +57,19 @@ def plan_bezier_free_guides(case: PlanCase, options: FreeGuidesOptions | None = 
             where="plan.bezier_free_guides.degree",
             fix=f"choose a degree from {LEAST_DEGREE} to {LARGEST_DEGREE}; the paper's is 7",
         )
+    rough = search_case(case)
     coarse = FreeGuides(
-        case, options.degree, np.inf, _COARSE_SAMPLES, _COARSE_PATH_SAMPLES, 1, options.objective
+        rough, options.degree, np.inf, _COARSE_SAMPLES, _COARSE_PATH_SAMPLES, 1, options.objective
     )
     search = search_cone_entry(
-        case,
+        rough,
         lambda entry_s: free_guides_program(replace(coarse, entry_s=entry_s)),
         _starts(coarse),
         max(first_time_to_go(case), case.tof_s / options.degree),
     )
     fine = replace(
         coarse,
+        case=case,
         entry_s=search.entry_s,
         samples=options.samples,
         path_samples=CHECK_SAMPLES,
@@ -84,6 +87,7 @@ def plan_bezier_free_guides(case: PlanCase, options: FreeGuidesOptions | None = 
         "cone_entries_tried_s": search.tried_s,
         "cone_entries_cost": search.tried_cost,
         "starts_cost": search.starts_cost,
+        "searched_in": "point mass" if rough is not case else "the field of the plan",
         "thrust_share_at_samples": fine.thrust_share,
     }
     return plan_of(
@@ -108,7 +112,7 @@ def _within_thrust(fine: FreeGuides, start: FloatArray) -> tuple[FreeGuides, Con
         peak = _peak_share(fine, solution.x)
         if peak <= 1.0:
             break
-        fine, start = replace(fine, thrust_share=fine.thrust_share / peak - 1e-6), solution.x
+        fine, start = replace(fine, thrust_share=_ROOM * fine.thrust_share / peak), solution.x
     return fine, solution, rounds
 
 

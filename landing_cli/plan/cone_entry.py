@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
+from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.optimize.cone_program import ConeOptions, ConeProgram, ConeSolution, solve_cone_program
 from landing_cli.plan.records import PlanCase
 
@@ -84,9 +86,9 @@ def search_cone_entry(
             start = best.x
         solution = solve_cone_program(program_of(case.tof_s - time_to_go_s), start, ROUGH)
         rounds += solution.rounds
-        if best is None or _cost(solution) < _cost(best):
+        if best is None or priced(solution) < priced(best):
             best = solution
-        return _cost(solution), solution
+        return priced(solution), solution
 
     starts_cost = [solve(first_s, start)[0] for start in starts]
     to_go, solution, tried = least_cost_time_to_go(solve, first_s, case.tof_s)
@@ -100,8 +102,29 @@ def search_cone_entry(
     )
 
 
-def _cost(solution: ConeSolution) -> float:
+def priced(solution: ConeSolution) -> float:
+    """Objective of a rough solution, violations at their price included."""
     return solution.value + _PRICE * solution.rows.total
+
+
+def search_case(case: PlanCase) -> PlanCase:
+    """Give a case a field that is cheap enough to search in.
+
+    Parameters
+    ----------
+    case : PlanCase
+        What is asked.
+
+    Returns
+    -------
+    PlanCase
+        In a polyhedral field, the case in that of the same mass in a point: the best time of cone entry moves
+        by seconds, and evaluating thousands of facets at every node of every trial is saved. The last solve
+        is always in the case's own field. Otherwise the case itself.
+    """
+    if case.asteroid.gravity.kind != GravityKind.POLYHEDRON:
+        return case
+    return replace(case, asteroid=replace(case.asteroid, gravity=point_mass_field(case.asteroid.gm_m3_s2)))
 
 
 def first_time_to_go(case: PlanCase) -> float:

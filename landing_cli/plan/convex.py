@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.flight.legs import LinearAccelerationLeg
-from landing_cli.optimize.cone_program import ConeSolution, solve_cone_program
+from landing_cli.optimize.cone_program import ConeOptions, ConeSolution, solve_cone_program
 from landing_cli.plan.assess import plan_of
-from landing_cli.plan.cone_entry import FINE, first_time_to_go, search_cone_entry
+from landing_cli.plan.cone_entry import FINE, ROUGH, first_time_to_go, priced, search_case, search_cone_entry
 from landing_cli.plan.free_flight import (
     EXCESS_TOLERANCE,
     SPENT,
@@ -60,26 +60,32 @@ def plan_convex(case: PlanCase, options: ConvexOptions | None = None) -> Plan:
         The control is linear between nodes.
     """
     options = options or ConvexOptions()
-    free = _without_terrain(case, options)
-    if free.solution.x[-1] > EXCESS_TOLERANCE:
-        return _answer(free, options, {}, "even without terrain, ", free.solution.rounds)
+    rough = search_case(case)
+    free = _without_terrain(rough, options)
+    bound = _refined(free, options.nodes, case=case, drive=FINE)
+    if bound.solution.x[-1] > EXCESS_TOLERANCE:
+        rounds = free.solution.rounds + bound.solution.rounds
+        return _answer(bound, options, {}, "even without terrain, ", rounds)
     starts = _either_side(free)
+    placed = _refined(min(starts, key=_cost), _COARSE_NODES)
     search = search_cone_entry(
-        case,
-        lambda entry_s: free_flight_program(replace(free.flight, entry_s=entry_s)),
-        starts,
+        rough,
+        lambda entry_s: free_flight_program(replace(placed.flight, entry_s=entry_s)),
+        [placed.solution.x],
         first_time_to_go(case),
     )
-    coarse = _Solved(replace(free.flight, entry_s=search.entry_s), search.solution)
-    solved = _refined(coarse, options.nodes)
+    coarse = _Solved(replace(placed.flight, entry_s=search.entry_s), search.solution)
+    solved = _refined(coarse, options.nodes, case=case, samples=CHECK_SAMPLES, bucket=_BUCKET, drive=FINE)
     searched: dict[str, Parameter] = {
         "cone_entry_bound_s": search.entry_s,
         "cone_entries_tried_s": search.tried_s,
         "cone_entries_cost": search.tried_cost,
-        "starts_cost": search.starts_cost,
-        "fuel_without_terrain_kg": _fuel_kg(free),
+        "starts_cost": [_cost(one) for one in starts],
+        "fuel_without_terrain_kg": _fuel_kg(bound),
+        "searched_in": "point mass" if rough is not case else "the field of the plan",
+        "last_arc_s": float(np.diff(solved.flight.times_s)[-1]),
     }
-    rounds = free.solution.rounds + search.rounds + solved.solution.rounds
+    rounds = search.rounds + sum(one.solution.rounds for one in (free, bound, *starts, placed, solved))
     return _answer(solved, options, searched, "", rounds)
 
 
@@ -91,23 +97,43 @@ def _without_terrain(case: PlanCase, options: ConvexOptions) -> _Solved:
     return _Solved(flight, solve_cone_program(free_flight_program(flight), start, FINE))
 
 
-def _either_side(free: _Solved) -> list[FloatArray]:
-    """Unknowns of the free path pushed out of the body, and bent to its other side."""
-    flight = free.flight
+def _either_side(free: _Solved) -> list[_Solved]:
+    """Solve roughly from the free path pushed out of the body, and from it bent to the other side."""
+    flight = replace(free.flight, entry_s=free.flight.case.tof_s - first_time_to_go(free.flight.case))
     states, thrust, _ = unpacked(flight, free.solution.x)
-    paths = starting_paths(flight.case, flight.times_s, states[:, :3])
-    return [packed(flight, np.concatenate([path, states[:, 3:]], axis=1), thrust) for path in paths]
+    solved = []
+    for path in starting_paths(flight.case, flight.times_s, states[:, :3]):
+        start = packed(flight, np.concatenate([path, states[:, 3:]], axis=1), thrust)
+        solved.append(_Solved(flight, solve_cone_program(free_flight_program(flight), start, ROUGH)))
+    return solved
 
 
-def _refined(coarse: _Solved, nodes: int) -> _Solved:
-    """Place the nodes where the thrust changes, bind all samples, and solve to the end."""
-    states, thrust, _ = unpacked(coarse.flight, coarse.solution.x)
-    times = refined_times(coarse.flight.times_s, thrust, nodes)
-    flight = replace(coarse.flight, times_s=times, samples=CHECK_SAMPLES, bucket=_BUCKET)
-    columns = np.concatenate([states, thrust], axis=1).T
-    at_nodes = np.stack([np.interp(times, coarse.flight.times_s, column) for column in columns], axis=1)
-    start = packed(flight, at_nodes[:, :6], at_nodes[:, 6:])
-    return _Solved(flight, solve_cone_program(free_flight_program(flight), start, FINE))
+def _cost(solved: _Solved) -> float:
+    return priced(solved.solution)
+
+
+def _refined(
+    solved: _Solved,
+    nodes: int,
+    *,
+    case: PlanCase | None = None,
+    samples: int = _COARSE_SAMPLES,
+    bucket: int = 1,
+    drive: ConeOptions = ROUGH,
+) -> _Solved:
+    """Place the nodes where the thrust changes, and solve again from there."""
+    states, thrust, _ = unpacked(solved.flight, solved.solution.x)
+    old = solved.flight.times_s
+    times = refined_times(old, thrust, nodes)
+    flight = replace(
+        solved.flight, case=case or solved.flight.case, times_s=times, samples=samples, bucket=bucket
+    )
+    states, thrust = (
+        np.stack([np.interp(times, old, column) for column in values.T], axis=1)
+        for values in (states, thrust)
+    )
+    start = packed(flight, states, thrust)
+    return _Solved(flight, solve_cone_program(free_flight_program(flight), start, drive))
 
 
 def _fuel_kg(solved: _Solved) -> float:

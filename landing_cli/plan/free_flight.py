@@ -32,6 +32,7 @@ WIDTH = 11
 EXCESS_PRICE = 10.0
 """Cost of thrust above its bound, in (largest thrust acceleration) t_f per unit of excess."""
 EXCESS_TOLERANCE = 1e-6
+ENERGY_TRACE = 1e-6
 CLEARANCE_MARGIN_M = 0.01
 CONE_MARGIN_RAD = 2e-5
 REACH = 0.1
@@ -138,8 +139,8 @@ def free_flight_program(flight: FreeFlight) -> ConeProgram:
     columns, m = flight.columns, flight.unknowns
     cost, reach = np.zeros(m), np.full(m, np.inf)
     cost[-1] = EXCESS_PRICE
-    # energy: a trace of S keeps sigma on |u|, where the flown mass needs it
-    cost[columns[-1, SPENT]] = 1.0 if flight.objective == "fuel" else 1e-4
+    # energy: a trace of S keeps sigma on |u|, for the flown mass and the propellant
+    cost[columns[-1, SPENT]] = 1.0 if flight.objective == "fuel" else ENERGY_TRACE
     reach[columns[1:-1, R].ravel()] = REACH
     pick = sparse.eye_array(m, format="csr")
     blocks = (

@@ -18,7 +18,14 @@ from landing_cli.body.gravity.field_values import gradients
 from landing_cli.flight.acceleration_control import natural_accelerations
 from landing_cli.flight.bezier_curve import bezier_basis, first_control_points, last_control_points
 from landing_cli.optimize.cone_program import ConeBlock, ConeProgram, SmoothRows
-from landing_cli.plan.free_flight import CLEARANCE_MARGIN_M, EXCESS_PRICE, REACH, cone_matrix, sparse_rows
+from landing_cli.plan.free_flight import (
+    CLEARANCE_MARGIN_M,
+    ENERGY_TRACE,
+    EXCESS_PRICE,
+    REACH,
+    cone_matrix,
+    sparse_rows,
+)
 from landing_cli.plan.path_rows import path_rows
 from landing_cli.plan.records import Objective, PlanCase
 
@@ -138,8 +145,8 @@ def free_guides_program(guides: FreeGuides) -> ConeProgram:
     columns, m = guides.columns, guides.unknowns
     cost, reach = np.zeros(m), np.full(m, np.inf)
     cost[-1] = EXCESS_PRICE
-    # energy: a trace of S keeps sigma on |u|, where the flown mass needs it
-    cost[columns[-1, SPENT]] = 1.0 if guides.objective == "fuel" else 1e-4
+    # energy: a trace of S keeps sigma on |u|, for the flown mass and the propellant
+    cost[columns[-1, SPENT]] = 1.0 if guides.objective == "fuel" else ENERGY_TRACE
     reach[: 3 * guides.guides] = 2.0 * REACH
     pick = sparse.eye_array(m, format="csr")
     blocks = (*_thrust_blocks(guides, pick), *_cone_blocks(guides, pick))

@@ -55,7 +55,8 @@ def path_rows(
     positions_m : (n, 3) float, m, body frame
         The samples; the last one is the touchdown, which is not bound.
     entry : int
-        First sample that has to lie in the cone; the samples before it keep the clearance.
+        First sample that has to lie in the cone. It keeps the clearance like those before it, so that nothing
+        hides between two samples of which one keeps the one and the next the other.
     bucket : int
         Samples that share a row.
     margin_m : float, m
@@ -69,7 +70,8 @@ def path_rows(
         As many rows for any positions.
     """
     distance, slope = distances_with_slopes(case.surface, positions_m)
-    before, after = slice(1, entry), slice(entry, len(positions_m) - 1)
+    last = len(positions_m) - 1
+    before, after = slice(1, min(entry + 1, last)), slice(entry, last)
     clearance, direction = distance[before], slope[before]
     if case.clearance_metric == "vertices":
         clearance, direction = vertices_with_slopes(case.surface, positions_m[before])
