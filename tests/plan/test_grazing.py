@@ -94,3 +94,10 @@ def test_vertex_distance_is_that_of_every_vertex():
     brute = np.linalg.norm(points[:, None] - mesh.vertices, axis=2).min(axis=1)
     np.testing.assert_allclose(vertex_distances(surface, points), brute, rtol=1e-13)
     assert (np.abs(signed_distances(surface, points)) <= brute * (1 + 1e-13)).all()
+
+
+def test_what_lies_behind_the_eye_is_not_grazed():
+    outline = np.array([[[2.0, 1.0], [3.0, -0.5]], [[-1.0, 5.0], [-0.1, -7.0]]])
+    right, left = grazing_angles(outline, [0.0, 0.0])
+    assert (right, left) == (np.arctan2(-0.5, 3.0), np.arctan2(1.0, 2.0))
+    assert np.isnan(grazing_angles(outline, [10.0, 0.0])).all()
