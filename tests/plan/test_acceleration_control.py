@@ -1,4 +1,4 @@
-"""Thrust acceleration at any time, and its re-flight: against the curve, polynomials, and another integrator."""
+"""Thrust acceleration at any time and its re-flight: against curve, polynomials, another integrator."""
 
 from __future__ import annotations
 
