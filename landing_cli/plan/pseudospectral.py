@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from landing_cli.flight.trajectory import Trajectory
 from landing_cli.optimize.cone_program import ConeSolution, solve_cone_program
 from landing_cli.plan.assess import Measured, accelerations_at, broken_constraints, measure, no_plan, plan_of
-from landing_cli.plan.cone_entry import FINE, first_time_to_go, search_cone_entry
+from landing_cli.plan.cone_entry import FINE, ROUGH, first_time_to_go, search_cone_entry
 from landing_cli.plan.gauss_program import (
     GaussProblem,
     build_program,
@@ -78,17 +78,12 @@ def plan_pseudospectral(case: PlanCase, options: PseudospectralOptions | None = 
         parameters = _choices(free.problem, options)
         why = _too_weak(free)
         return no_plan(case, METHOD, "infeasible", why, iterations=free.rounds, parameters=parameters)
-    nodes = phase_nodes(options.nodes)
-
-    def problem_at(entry_s: float) -> GaussProblem:
-        entry = round(entry_s / case.tof_s * (CHECK_SAMPLES - 1))
-        entry = min(max(entry, 2), CHECK_SAMPLES - 2)
-        return gauss_problem(case, options.objective, options.terminal, entry, nodes)
-
     first_s = first_time_to_go(case)
-    starts = _either_side(free, problem_at(case.tof_s - first_s))
-    search = search_cone_entry(case, lambda entry_s: build_program(problem_at(entry_s)), starts, first_s)
-    solved = _as_flown(problem_at(search.entry_s), search.solution.x)
+    starts = _either_side(free, _problem_at(case, options, case.tof_s - first_s))
+    search = search_cone_entry(
+        case, lambda entry_s: build_program(_problem_at(case, options, entry_s)), starts, first_s
+    )
+    solved = _as_flown(_problem_at(case, options, search.entry_s), search.solution.x)
     searched: dict[str, Parameter] = {
         "cone_entry_bound_s": solved.problem.phases[1].start_s,
         "cone_entries_tried_s": search.tried_s,
@@ -98,6 +93,37 @@ def plan_pseudospectral(case: PlanCase, options: PseudospectralOptions | None = 
         "thrust_share": list(solved.problem.thrust_share),
     }
     return _answer(solved, options, searched, free.rounds + search.rounds + solved.rounds)
+
+
+def plan_entering_at(case: PlanCase, options: PseudospectralOptions, entry_s: float) -> Plan:
+    """Plan with a given time of cone entry.
+
+    Parameters
+    ----------
+    case : PlanCase
+        What is asked.
+    options : PseudospectralOptions
+        Objective, terminal conditions and number of nodes.
+    entry_s : float, s
+        From then on the path is in the cone; it may be so earlier.
+
+    Returns
+    -------
+    Plan
+    """
+    free, problem = without_terrain(case, options), _problem_at(case, options, entry_s)
+    tried = [
+        solve_cone_program(build_program(problem), start, ROUGH) for start in _either_side(free, problem)
+    ]
+    best = min(tried, key=lambda one: one.value + ROUGH.price * one.rows.total)
+    solved = _as_flown(problem, best.x)
+    rounds = free.rounds + sum(one.rounds for one in tried) + solved.rounds
+    return _answer(solved, options, {"cone_entry_bound_s": entry_s}, rounds)
+
+
+def _problem_at(case: PlanCase, options: PseudospectralOptions, entry_s: float) -> GaussProblem:
+    entry = min(max(round(entry_s / case.tof_s * (CHECK_SAMPLES - 1)), 2), CHECK_SAMPLES - 2)
+    return gauss_problem(case, options.objective, options.terminal, entry, phase_nodes(options.nodes))
 
 
 def phase_nodes(nodes: int) -> tuple[int, int]:
