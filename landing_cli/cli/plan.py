@@ -148,7 +148,7 @@ def convex(
         typer.Option(
             "--bezier-degree",
             min=6,
-            max=30,
+            max=14,
             metavar="N",
             help="A Bezier curve of degree N, its N - 5 inner control points free in space. Repeatable.",
         ),
@@ -292,7 +292,7 @@ def _carry_out(
     guard.hint_on_interrupt(f"finished plans are kept: continue with --resume (output {path})")
     options = RunOptions(plan=work, resume=way.resume, force=way.force)
     with voice.progress("plans") as progress:
-        outcome = run_plans(request, tasks, path, options, progress)
+        outcome = run_plans(request, tasks, path, options, progress, voice.say)
     guard.hint_on_interrupt("")
     if outcome.up_to_date:
         voice.say(f"{path} is up to date: same scenario, shape and version (--force solves again)")

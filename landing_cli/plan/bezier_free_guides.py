@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 
 METHOD = "bezier_free_guides"
 
-LEAST_DEGREE, LARGEST_DEGREE = 6, 20
+LEAST_DEGREE, LARGEST_DEGREE = 6, 14
 _COARSE_SAMPLES = 81
 _COARSE_PATH_SAMPLES = 401
 _BUCKET = 5
@@ -48,7 +48,7 @@ def plan_bezier_free_guides(case: PlanCase, options: FreeGuidesOptions | None = 
     Raises
     ------
     InputRefused
-        The degree leaves no control point free, or is too high for a curve in Bernstein form to be of use.
+        The degree leaves no control point free, or is above 14, where the search has been seen to stall.
     """
     options = options or FreeGuidesOptions()
     if not LEAST_DEGREE <= options.degree <= LARGEST_DEGREE:

@@ -102,7 +102,7 @@ class BezierSection(Section):
 class FreeGuidesSection(Section):
     """The Bezier curve whose inner control points are free: `plan convex --bezier-degree`."""
 
-    degree: int = Field(default=7, ge=6, le=30, description="degree n: n - 5 control points are free")
+    degree: int = Field(default=7, ge=6, le=14, description="degree n: n - 5 control points are free")
     objective: Literal["fuel", "energy"] = Field(default="fuel", description=OBJECTIVES)
     samples: int = Field(
         default=201, ge=11, le=20_001, description="times at which the constraints are imposed"
