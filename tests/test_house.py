@@ -21,7 +21,7 @@ LONGEST_FILE = 500
 GROUND = {"errors"}
 PHYSICS = {"body", "flight", *GROUND}
 TOOLS = {"sources", "optimize", *PHYSICS}
-RECORDS = {"scenario", "results", "parallel", *TOOLS}
+RECORDS = {"scenario", "results", "parallel", "compile_cache", *TOOLS}
 ROOMS: dict[str, set[str]] = {
     "errors": set(),
     "compile_cache": set(),

@@ -13,6 +13,8 @@ import numpy as np
 
 from landing_cli import __version__
 from landing_cli.body.asteroid import Asteroid
+from landing_cli.compile_cache import is_cached
+from landing_cli.flight.acceleration_control import natural_accelerations
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.parallel import LostChunk, WorkPlan, run_chunks
 from landing_cli.plan.assess import no_plan
@@ -38,6 +40,7 @@ from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.sections import for_mission
 from landing_cli.scenario.show import to_yaml
 
+COMPILING = "compiling the kernels (once after an installation; about half a minute)"
 CHUNK_PLANS = 8  # of a sweep; other tasks go one by one
 STORED_PATHS = 40
 """A run of more plans than this stores their controls alone: they suffice, and 360 paths make 60 MB."""
@@ -112,6 +115,7 @@ def run(
     output: Path,
     options: RunOptions,
     progress: Callable[[int, int], None],
+    say: Callable[[str], None] = lambda _: None,
 ) -> Outcome:
     """Solve the tasks of a command and store their plans.
 
@@ -127,6 +131,8 @@ def run(
         Backend, resume, force.
     progress : callable
         Told (solved, total) plans.
+    say : callable
+        Told one line when something takes a while.
 
     Returns
     -------
@@ -146,6 +152,8 @@ def run(
     if journal is None:
         return Outcome(run_from_result(read(output)), up_to_date=True, lost={})
     with journal:
+        if not is_cached(natural_accelerations):  # every method calls it
+            say(COMPILING)
         solved, lost = _solve(tasks, size, journal, options, progress)
         found = PlanRun(tuple(_entry(task, solved.get(i), lost) for i, task in enumerate(tasks)))
         taken = {"jobs": options.plan.jobs, "backend": options.plan.backend, "resumed": int(options.resume)}
