@@ -43,7 +43,7 @@ def plan_bezier_free_guides(case: PlanCase, options: FreeGuidesOptions | None = 
     Returns
     -------
     Plan
-        A local optimum; ``infeasible`` where the least violation found from either side of the body remains.
+        A local optimum; ``infeasible`` where the least violation found remains.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def _peak_share(fine: FreeGuides, x: FloatArray) -> float:
 
 
 def _starts(guides: FreeGuides) -> list[FloatArray]:
-    """Curves out of the body on either side, from the curve of the same degree that passes through it."""
+    """Curves out of the body on several sides, from the curve of the same degree that passes through it."""
     case = guides.case
     times = np.linspace(0.0, case.tof_s, _COARSE_PATH_SAMPLES)
     straight = bezier_basis(5, times / case.tof_s) @ control_points(

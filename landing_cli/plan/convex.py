@@ -56,7 +56,7 @@ def plan_convex(case: PlanCase, options: ConvexOptions | None = None) -> Plan:
     Returns
     -------
     Plan
-        A local optimum; ``infeasible`` where the least violation found from either side of the body remains.
+        A local optimum; ``infeasible`` where the least violation found remains.
         The control is linear between nodes.
     """
     options = options or ConvexOptions()
@@ -66,7 +66,7 @@ def plan_convex(case: PlanCase, options: ConvexOptions | None = None) -> Plan:
     if bound.solution.x[-1] > EXCESS_TOLERANCE:
         rounds = free.solution.rounds + bound.solution.rounds
         return _answer(bound, options, {}, "even without terrain, ", rounds)
-    starts = _either_side(free)
+    starts = _every_side(free)
     placed = _refined(min(starts, key=_cost), _COARSE_NODES)
     search = search_cone_entry(
         rough,
@@ -97,8 +97,8 @@ def _without_terrain(case: PlanCase, options: ConvexOptions) -> _Solved:
     return _Solved(flight, solve_cone_program(free_flight_program(flight), start, FINE))
 
 
-def _either_side(free: _Solved) -> list[_Solved]:
-    """Solve roughly from the free path pushed out of the body, and from it bent to the other side."""
+def _every_side(free: _Solved) -> list[_Solved]:
+    """Solve roughly from the free path pushed out of the body, and from it bent to its other sides."""
     flight = replace(free.flight, entry_s=free.flight.case.tof_s - first_time_to_go(free.flight.case))
     states, thrust, _ = unpacked(flight, free.solution.x)
     solved = []

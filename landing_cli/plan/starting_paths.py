@@ -1,4 +1,4 @@
-"""Paths from which the successive convexification begins: out of the body, on either side of it."""
+"""Paths from which the successive convexification begins: out of the body, on several sides of it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def boundary_cubic(case: PlanCase, times_s: FloatArray) -> FloatArray:
 
 
 def starting_paths(case: PlanCase, times_s: FloatArray, path_m: FloatArray) -> list[FloatArray]:
-    """Move a path out of the body, and find one that goes round it the other way.
+    """Move a path out of the body, and find others that go round it by other ways.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ def starting_paths(case: PlanCase, times_s: FloatArray, path_m: FloatArray) -> l
     Returns
     -------
     list of (n, 3) float, m
-        One path where the given one is clear already; else the given path pushed out along the radius and,
-        where there is one, a path that is bent to the other side. Both begin and end as the given one.
+        One path where the given one is clear already; else the given path pushed out along the radius and
+        those of the paths bent to the other three sides that come clear. All begin and end as the given one.
     """
     early = times_s < case.tof_s - first_time_to_go(case)
     early[0] = False
@@ -56,31 +56,34 @@ def starting_paths(case: PlanCase, times_s: FloatArray, path_m: FloatArray) -> l
         if not low.any():
             break
         out[low] *= _GROWTH
-    other = _other_side(case, path_m, out, early)
-    return [out] if other is None else [out, other]
+    return [out, *_other_sides(case, path_m, out, early)]
 
 
 def _clear(case: PlanCase, points: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(signed_distances(case.surface, points) >= _ROOM * case.clearance_m)
 
 
-def _other_side(
+def _other_sides(
     case: PlanCase, path: FloatArray, out: FloatArray, early: NDArray[np.bool_]
-) -> FloatArray | None:
-    """Bend a path away from the side to which it was pushed, until it is clear."""
+) -> list[FloatArray]:
+    """Bend a path to the three sides other than that to which it was pushed, until it is clear."""
     chord = (path[-1] - path[0]) / np.linalg.norm(path[-1] - path[0])
     pushed = (out - path).mean(axis=0)
     aside = pushed - chord * (chord @ pushed)
     if np.linalg.norm(aside) < 1e-6:
-        return None
+        return []
+    aside /= np.linalg.norm(aside)
     share = np.linspace(0.0, 1.0, len(path))
-    bend = -((4.0 * share * (1.0 - share))[:, None] ** 2) * aside / np.linalg.norm(aside)
     size = float(np.linalg.norm(case.asteroid.mesh.vertices, axis=1).max())
-    for amount in np.linspace(0.0, _SIZES * size, _SIZES * _STEPS + 1)[1:]:
-        bent = path + amount * bend
-        if _clear(case, bent[early]).all():
-            return np.asarray(bent)
-    return None
+    paths = []
+    for side in (-aside, np.cross(chord, aside), np.cross(aside, chord)):
+        bend = (4.0 * share * (1.0 - share))[:, None] ** 2 * side
+        for amount in np.linspace(0.0, _SIZES * size, _SIZES * _STEPS + 1)[1:]:
+            bent = path + amount * bend
+            if _clear(case, bent[early]).all():
+                paths.append(bent)
+                break
+    return paths
 
 
 def refined_times(times_s: FloatArray, values: FloatArray, count: int) -> FloatArray:
