@@ -9,8 +9,9 @@ from __future__ import annotations
 import hashlib
 import os
 from pathlib import Path
+from typing import Any
 
-ROOMS = ("body", "flight", "optimize", "reach")
+ROOMS = ("body", "flight", "optimize", "reach", "plan")
 # LLVM's first level: a fifth off the compilation, and the kernels run as fast.
 OPTIMISATION_LEVEL = "1"
 
@@ -39,3 +40,12 @@ def use_own_cache() -> None:
     except OSError:
         return
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
+
+
+def is_cached(kernel: Any) -> bool:
+    """Tell whether a numba kernel was compiled before, by this version for this kind of processor."""
+    try:
+        cache = kernel._cache
+        return Path(cache.cache_path, cache._cache_file._index_name).exists()
+    except AttributeError:  # another numba
+        return True

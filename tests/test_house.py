@@ -21,7 +21,7 @@ LONGEST_FILE = 500
 GROUND = {"errors", "kernel"}
 PHYSICS = {"body", "flight", *GROUND}
 TOOLS = {"sources", "optimize", *PHYSICS}
-RECORDS = {"scenario", "results", "parallel", *TOOLS}
+RECORDS = {"scenario", "results", "parallel", "compile_cache", *TOOLS}
 ROOMS: dict[str, set[str]] = {
     "errors": set(),
     "compile_cache": set(),
@@ -34,7 +34,8 @@ ROOMS: dict[str, set[str]] = {
     "scenario": TOOLS,
     "results": TOOLS,
     "reach": RECORDS,
-    "cli": {"reach", *RECORDS},
+    "plan": RECORDS,
+    "cli": {"reach", "plan", *RECORDS},
 }
 # library -> the only place that knows it
 LIBRARIES = {

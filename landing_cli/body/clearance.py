@@ -103,10 +103,23 @@ def signed_distance(
 
 
 @kernel
-def _signed_distance_from(
-    surface: SurfaceIndex, x: float, y: float, z: float, slot: int
-) -> tuple[float, int]:
-    """Signed distance and slot of the closest facet; the facet in the given slot is the first guess."""
+def signed_distance_from(surface: SurfaceIndex, x: float, y: float, z: float, slot: int) -> tuple[float, int]:
+    """Signed distance from one point to the surface, and the slot of the closest facet.
+
+    Parameters
+    ----------
+    surface : SurfaceIndex
+        The surface.
+    x, y, z : float, m, body frame
+        The point.
+    slot : int
+        Slot of the first guess: the answer for a point nearby, or 0.
+
+    Returns
+    -------
+    (float, int)
+        Signed distance (m) and slot.
+    """
     distance2, feature = triangle_distance2(surface.triangles, slot, x, y, z)
     distance2, slot, feature = closest_slot(surface, x, y, z, distance2, slot, feature)
     return _with_sign(surface, distance2, slot, feature, x, y, z), slot
@@ -119,7 +132,7 @@ def signed_distances_into(
     """Write the signed distances (n,), m, and the closest facets (n,) of (n, 3) points."""
     slot = 0
     for i in range(points.shape[0]):
-        distances[i], slot = _signed_distance_from(surface, points[i, 0], points[i, 1], points[i, 2], slot)
+        distances[i], slot = signed_distance_from(surface, points[i, 0], points[i, 1], points[i, 2], slot)
         facets[i] = surface.facets[slot]
 
 
@@ -170,7 +183,7 @@ def path_clearance(
             slack = known - threshold
             if slack > 0.0 and (x - kx) ** 2 + (y - ky) ** 2 + (z - kz) ** 2 <= slack * slack:
                 continue
-            known, slot = _signed_distance_from(surface, x, y, z, slot)
+            known, slot = signed_distance_from(surface, x, y, z, slot)
             kx, ky, kz = x, y, z
             if known != known:
                 return np.nan, -1

@@ -8,13 +8,14 @@ from typing import Any
 import typer
 
 from landing_cli import __version__
-from landing_cli.cli import reach, results, scenario, shapes
+from landing_cli.cli import plan, reach, results, scenario, shapes
 from landing_cli.cli.options import new_program
 from landing_cli.errors import ExitCode, InputRefused
 
 # console script -> its commands
 MISSIONS: dict[str, typer.Typer] = {
     "reach": reach.app,
+    "plan": plan.app,
 }
 # groups of the umbrella command beside the missions
 GROUPS: dict[str, typer.Typer] = {
@@ -24,7 +25,6 @@ GROUPS: dict[str, typer.Typer] = {
 }
 # console scripts that are installed already, and what a later version will do with them
 LATER = {
-    "plan": "planning the flight to one landing site",
     "tour": "searching for asteroids to visit on the way",
 }
 

@@ -60,6 +60,20 @@ Output = Annotated[
     Path | None,
     typer.Option("--output", "-o", metavar="PATH", help="Where to write; a name is chosen unless given."),
 ]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", "-j", metavar="N", help="Threads or processes; all processors unless given."),
+]
+BackendName = Annotated[Backend, typer.Option("--backend", help="Where the solving runs.")]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler", metavar="ADDRESS", help="Dask scheduler, tcp://HOST:8786; for --backend dask."
+    ),
+]
+Resume = Annotated[bool, typer.Option("--resume", help="Continue an unfinished run.")]
+StartOver = Annotated[bool, typer.Option("--force", help="Start over, whatever the output holds.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Check everything, say what would run, and stop.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no remarks on stderr.")]
 Force = Annotated[bool, typer.Option("--force", help="Write over what is there.")]

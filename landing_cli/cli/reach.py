@@ -13,11 +13,17 @@ import typer
 from landing_cli.cli import console, guard
 from landing_cli.cli.options import (
     Backend,
+    BackendName,
+    DryRun,
+    Jobs,
     Json,
     Output,
     Overrides,
     Quiet,
+    Resume,
     ScenarioName,
+    Scheduler,
+    StartOver,
     new_program,
 )
 from landing_cli.errors import NothingFeasible, PartialResult
@@ -44,12 +50,11 @@ _VERIFICATION = (
     "verdict",
 )
 
-app = new_program("Where on an asteroid the spacecraft can land.")
+# what `landing results export` writes of a run
+TABLES = ("facets", "boundary", "trajectory", "summary")
+HAS_FACETS = True
 
-Jobs = Annotated[
-    int | None,
-    typer.Option("--jobs", "-j", metavar="N", help="Threads or processes; all processors unless given."),
-]
+app = new_program("Where on an asteroid the spacecraft can land.")
 
 
 @app.command()
@@ -57,20 +62,15 @@ def run(
     scenario: ScenarioName,
     output: Output = None,
     jobs: Jobs = None,
-    backend: Annotated[Backend, typer.Option(help="Where the solving runs.")] = Backend.THREADS,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Dask scheduler, tcp://HOST:8786; for --backend dask."),
-    ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue an unfinished run.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Start over, whatever the output holds.")] = False,
+    backend: BackendName = Backend.THREADS,
+    scheduler: Scheduler = None,
+    resume: Resume = False,
+    force: StartOver = False,
     overrides: Overrides = None,
     compare: Annotated[
         bool, typer.Option("--compare", help="Run the section method and the traversal, and compare them.")
     ] = False,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Check everything, say what would run, and stop.")
-    ] = False,
+    dry_run: DryRun = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -238,9 +238,10 @@ def _short(value: object) -> object:
 
 def _say_plan(loaded: LoadedScenario, path: Path, as_json: bool) -> None:
     from landing_cli.scenario.build import build
+    from landing_cli.scenario.sections import reach_section
 
+    reach = reach_section(loaded)
     facets = len(build(loaded).asteroid.mesh.faces)
-    reach = loaded.scenario.reach
     cases = [
         {"case": name, "initial_state": state.name, "tof_s": tof_s, "facets": facets}
         for name, state, tof_s in reach.cases()

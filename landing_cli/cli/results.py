@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from landing_cli.cli import console, reach
-from landing_cli.cli.options import Force, Json, Output, Quiet, ResultFile, new_group
+from landing_cli.cli import console, plan, reach
+from landing_cli.cli.options import Force, Jobs, Json, Output, Quiet, ResultFile, new_group
 from landing_cli.errors import InputRefused, OutputRefused, UsageError, VerificationFailed
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 app = new_group("Look at, export, draw, verify and compare result files.")
 
 # missions whose results this version reads: how to print them; each brings stored, figures, verify
-MISSIONS: dict[str, ModuleType] = {"reach": reach}
+MISSIONS: dict[str, ModuleType] = {"reach": reach, "plan": plan}
 
 CaseName = Annotated[
     str | None, typer.Option("--case", metavar="NAME", help="One case, as north_pole_700s; all unless given.")
@@ -69,6 +69,7 @@ def show(
     found, printer = _run_of(result), MISSIONS[result.mission]
     cases = _module(result, "exports").chosen_cases(found, case)
     if facet is not None:
+        _refuse_facet(result)
         printer.print_facet(cases, facet, run, as_json)
     else:
         printer.print_run(type(found)(cases), run, as_json)
@@ -79,9 +80,9 @@ def verify(
     run: ResultFile,
     case: CaseName = None,
     everything: Annotated[
-        bool, typer.Option("--all", help="Fly every facet under the polyhedron too, not a sample.")
+        bool, typer.Option("--all", help="Fly every control under the polyhedron too, not a sample.")
     ] = False,
-    jobs: reach.Jobs = None,
+    jobs: Jobs = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -112,7 +113,7 @@ def verify(
 def export(
     run: ResultFile,
     table: Annotated[
-        ExportedTable | None, typer.Option(help="What; facets unless given, trajectory for oem.")
+        ExportedTable | None, typer.Option(help="What; facets unless given (of a plan: trajectory).")
     ] = None,
     case: CaseName = None,
     facet: Facet = None,
@@ -125,9 +126,11 @@ def export(
     quiet: Quiet = False,
 ) -> None:
     """Write a table, a map or a trajectory of a result for other programs; to stdout without -o."""
-    chosen = table or (ExportedTable.TRAJECTORY if form is ExportFormat.OEM else ExportedTable.FACETS)
-    _refuse_nonsense(chosen, form, facet, output)
+    if form is ExportFormat.PLY and output is None:
+        raise UsageError("ply is binary", fix="name a file with -o")
     result = _read(run)
+    chosen = table or _usual_table(result, form)
+    _refuse_nonsense(result, chosen, form, facet)
     if output is not None:
         _refuse_existing(output, run, force)
     data = _exported(result, chosen, form, case, facet)
@@ -160,6 +163,8 @@ def plot(
     of the stored flight to that facet, flown again.
     """
     found = _read(run)
+    if facet is not None:
+        _refuse_facet(found)
     folder = run.parent if out is None else out
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -183,7 +188,7 @@ def diff(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compare two results: what was asked differently, and which facets were gained or lost."""
+    """Compare two results: what was asked differently, and what came out differently."""
     old, new = _read(before), _read(after)
     if old.mission != new.mission:
         raise InputRefused(
@@ -201,23 +206,44 @@ def diff(
         console.print_table(list(cases[0]), [list(case.values()) for case in cases])
 
 
+def _usual_table(result: StoredResult, form: ExportFormat) -> ExportedTable:
+    if form is ExportFormat.OEM:
+        return ExportedTable.TRAJECTORY
+    if form in MAP_FORMATS:
+        return ExportedTable.FACETS
+    return ExportedTable(MISSIONS[result.mission].TABLES[0])
+
+
+def _refuse_facet(result: StoredResult) -> None:
+    if not MISSIONS[result.mission].HAS_FACETS:
+        raise UsageError(
+            f"a result of {result.mission} has no facets", where="--facet", fix="choose with --case"
+        )
+
+
 def _refuse_nonsense(
-    table: ExportedTable, form: ExportFormat, facet: int | None, output: Path | None
+    result: StoredResult, table: ExportedTable, form: ExportFormat, facet: int | None
 ) -> None:
-    """Refuse what cannot be written in the chosen form, before anything is read."""
+    """Refuse what cannot be written of this result, or not in the chosen form."""
     flown = table is ExportedTable.TRAJECTORY
+    mission = MISSIONS[result.mission]
+    if table.value not in mission.TABLES:
+        what = "map" if form in MAP_FORMATS else f"{table} table"
+        raise UsageError(
+            f"a result of {result.mission} has no {what}", fix=f"its tables are {', '.join(mission.TABLES)}"
+        )
+    if facet is not None:
+        _refuse_facet(result)
     if form in MAP_FORMATS and table is not ExportedTable.FACETS:
         raise UsageError(
             f"{form} is a map of facets, not of a {table}", fix="take csv or json for this table"
         )
     if form is ExportFormat.OEM and not flown:
         raise UsageError(f"an oem holds a trajectory, not the {table} table", fix="take csv or json for it")
-    if flown and facet is None:
+    if flown and facet is None and mission.HAS_FACETS:
         raise UsageError("a trajectory leads to one facet", fix="name it with --facet")
     if facet is not None and not flown:
         raise UsageError(f"--facet does not go with the {table} table", fix="add --table trajectory")
-    if form is ExportFormat.PLY and output is None:
-        raise UsageError("ply is binary", fix="name a file with -o")
 
 
 def _refuse_existing(path: Path, run: Path, force: bool) -> None:
@@ -234,13 +260,13 @@ def _exported(
     run, exports = _run_of(result), _module(result, "exports")
     if form in MAP_FORMATS:
         return bytes(exports.export_map(run, form.value, case))
-    if facet is None:
+    if table is not ExportedTable.TRAJECTORY:
         return str(exports.export_table(run, table.value, form.value, case)).encode()
     cases = exports.chosen_cases(run, case)
     if len(cases) > 1:
-        names = ", ".join(chosen.case.name for chosen in cases)
+        names = exports.names_of(cases)
         raise UsageError("a trajectory is of one case", where="--case", fix=f"take one of {names}")
-    flown = _module(result, "flown").flown_trajectory(cases[0], facet)
+    flown = exports.trajectory_of(cases[0], facet)
     if form is not ExportFormat.OEM:
         return str(exports.export_table(run, table.value, form.value, case, flown)).encode()
     from datetime import UTC, datetime

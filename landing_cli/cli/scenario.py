@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from landing_cli.cli import console
 from landing_cli.cli.options import Force, Json, Output, Overrides, Quiet, ScenarioName, new_group
 from landing_cli.errors import OutputRefused
+
+if TYPE_CHECKING:
+    from landing_cli.scenario.build import Built
+    from landing_cli.scenario.load import LoadedScenario
+    from landing_cli.scenario.schema import Scenario
 
 app = new_group("Start, look at and check scenario files.")
 
@@ -78,8 +83,8 @@ def check(
         "facets": len(built.asteroid.mesh.faces),
         "gm_m3_s2": built.asteroid.gm_m3_s2,
         "rotation_rate_rad_s": built.asteroid.rotation_rate_rad_s,
-        "ellipsoid_m": [round(float(axis), 3) for axis in built.ellipsoid_m],
-        "cases": [name for name, _, _ in loaded.scenario.reach.cases()],
+        **_reach_facts(loaded.scenario, built),
+        **_plan_facts(loaded, built),
         "shape_sha256": built.shape_sha256,
     }
     if as_json:
@@ -94,6 +99,30 @@ def schema() -> None:
     from landing_cli.scenario.schema import json_schema
 
     console.print_json(json_schema())
+
+
+def _reach_facts(scenario: Scenario, built: Built) -> dict[str, object]:
+    if scenario.reach is None or built.ellipsoid_m is None:
+        return {}
+    return {
+        "ellipsoid_m": [round(float(axis), 3) for axis in built.ellipsoid_m],
+        "cases": [name for name, _, _ in scenario.reach.cases()],
+    }
+
+
+def _plan_facts(loaded: LoadedScenario, built: Built) -> dict[str, object]:
+    """Check the planning section against the mesh, and tell what it comes to."""
+    if loaded.scenario.plan is None:
+        return {}
+    from landing_cli.plan.cases import plan_cases
+
+    cases = plan_cases(loaded, built.asteroid, built.spacecraft)
+    return {
+        "site_m": [round(float(x), 3) for x in cases[0].site.position_m],
+        "site_facet": cases[0].site.facet,
+        "clearance_m": round(cases[0].clearance_m, 3),
+        "plans": [case.name for case in cases],
+    }
 
 
 def _plain(value: object) -> object:

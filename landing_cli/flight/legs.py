@@ -88,4 +88,68 @@ class FinalArcLeg:
         return (3.0 * offset + drift) / self.duration_s**2, -(2.0 * offset + drift) / self.duration_s**3
 
 
-Leg = ThrustNodesLeg | CostateLeg | FinalArcLeg
+@dataclass(frozen=True, eq=False)
+class BezierLeg:
+    """The thrust that keeps the spacecraft on a Bezier curve (Lyu 2026, eqs 6, 28).
+
+    The thrust cancels gravity, Coriolis and centrifugal acceleration along the curve, so its acceleration is
+    a function of time only.
+
+    Attributes
+    ----------
+    duration_s : float, s
+    points_m : (n + 1, 3) float, m, body frame
+        Control points P_0 ... P_n.
+    gravity : GravityField
+        The field that the control was planned in.
+    """
+
+    duration_s: float
+    points_m: FloatArray
+    gravity: GravityField
+
+
+@dataclass(frozen=True, eq=False)
+class LinearAccelerationLeg:
+    """Thrust acceleration that is linear between nodes.
+
+    Attributes
+    ----------
+    times_s : (k,) float, s
+        Since the start of the leg; increasing from 0 to its end.
+    acceleration_m_s2 : (k, 3) float, m/s2, rotating body frame
+        Thrust over mass at the nodes.
+    """
+
+    times_s: FloatArray
+    acceleration_m_s2: FloatArray
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the leg, s."""
+        return float(self.times_s[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class GaussAccelerationLeg:
+    """Thrust acceleration that is a polynomial over each interval, given at its Legendre-Gauss nodes.
+
+    Attributes
+    ----------
+    edges_s : (k + 1,) float, s
+        Ends of the intervals since the start of the leg; increasing from 0.
+    acceleration_m_s2 : (k, n, 3) float, m/s2, rotating body frame
+        Thrust over mass at the n Legendre-Gauss nodes of each interval; one node is a constant thrust.
+    """
+
+    edges_s: FloatArray
+    acceleration_m_s2: FloatArray
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the leg, s."""
+        return float(self.edges_s[-1])
+
+
+AccelerationLeg = BezierLeg | LinearAccelerationLeg | GaussAccelerationLeg
+Leg = ThrustNodesLeg | CostateLeg | FinalArcLeg | AccelerationLeg

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from landing_cli.body.gravity.field import GravityField
+from landing_cli.flight import acceleration_control  # noqa: F401  registers its legs
 from landing_cli.flight.control import ThrustPiece, sampled_control, thrust_pieces
 from landing_cli.flight.dynamics import natural_acceleration
 from landing_cli.flight.gauss import fly_sampled

@@ -8,12 +8,11 @@ import numpy as np
 
 from landing_cli.reach.records import LandingCase
 from landing_cli.scenario.build import Built
-from landing_cli.scenario.schema import Scenario
+from landing_cli.scenario.schema import Reach
 
 
-def landing_cases(scenario: Scenario, built: Built) -> tuple[tuple[str, LandingCase], ...]:
+def landing_cases(reach: Reach, built: Built) -> tuple[tuple[str, LandingCase], ...]:
     """Make every case of a scenario, in its order, each with the name of its initial state."""
-    reach = scenario.reach
     return tuple(
         (
             state.name,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from landing_cli.errors import InputRefused
 from landing_cli.flight.trajectory import Trajectory
+from landing_cli.reach.flown import flown_trajectory
 from landing_cli.reach.records import FACET_COLUMNS
 from landing_cli.reach.stored import CaseResult, ReachRun
 from landing_cli.results.maps import WRITERS, on_every_facet
@@ -97,9 +98,31 @@ def chosen_cases(run: ReachRun, case: str | None) -> tuple[CaseResult, ...]:
     """
     chosen = tuple(c for c in run.cases if case in (None, c.case.name))
     if not chosen:
-        names = ", ".join(c.case.name for c in run.cases)
+        names = names_of(run.cases)
         raise InputRefused(f"no case '{case}'", where="--case", fix=f"take one of {names}")
     return chosen
+
+
+def names_of(cases: Sequence[CaseResult]) -> str:
+    """List the names of cases, for messages."""
+    return ", ".join(result.case.name for result in cases)
+
+
+def trajectory_of(result: CaseResult, facet: int) -> Trajectory:
+    """Fly the stored control to a facet again.
+
+    Parameters
+    ----------
+    result : CaseResult
+        The case.
+    facet : int
+        0-based.
+
+    Returns
+    -------
+    Trajectory
+    """
+    return flown_trajectory(result, facet)
 
 
 def export_table(
@@ -164,7 +187,7 @@ def export_map(run: ReachRun, form: str, case: str | None = None) -> bytes:
         )
     cases = chosen_cases(run, case)
     if len(cases) > 1:
-        names = ", ".join(c.case.name for c in cases)
+        names = names_of(cases)
         raise InputRefused("a map shows one case", where="--case", fix=f"take one of {names}")
     mesh = run.asteroid.mesh
     return WRITERS[form](mesh, on_every_facet(facets_table(cases[0]), len(mesh.faces)))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
+from landing_cli.compile_cache import is_cached
 from landing_cli.reach.free_batch import solve_many
 
 
@@ -21,12 +21,4 @@ def are_compiled(descent: str) -> bool:
         from landing_cli.reach.extremal_descent import search_batch
 
         kernels.append(search_batch)
-    return all(_is_cached(kernel) for kernel in kernels)
-
-
-def _is_cached(kernel: Any) -> bool:
-    try:
-        cache = kernel._cache
-        return Path(cache.cache_path, cache._cache_file._index_name).exists()
-    except AttributeError:  # another numba
-        return True
+    return all(is_cached(kernel) for kernel in kernels)

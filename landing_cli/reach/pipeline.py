@@ -36,6 +36,7 @@ from landing_cli.results.store import read
 from landing_cli.scenario.build import build
 from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.schema import Reach
+from landing_cli.scenario.sections import for_mission, reach_section
 from landing_cli.scenario.show import to_yaml
 
 COMPILING = "compiling the kernels (once after an installation; about a minute)"
@@ -113,21 +114,26 @@ def run(
         The scenario contradicts its mesh, or the output is refused.
     """
     watch = Stopwatch()
-    scenario, built = loaded.scenario, build(loaded)
+    reach = reach_section(loaded)
+    built = build(loaded)
     command = "reach run --compare" if options.compare else "reach run"
     identity = RunIdentity(
-        command, to_yaml(scenario), built.shape_sha256, __version__, chunk_facets=CHUNK_FACETS
+        command,
+        to_yaml(for_mission(loaded.scenario, "reach")),
+        built.shape_sha256,
+        __version__,
+        chunk_facets=CHUNK_FACETS,
     )
     journal = open_output(output, identity, resume=options.resume, force=options.force)
     if journal is None:
         return Outcome(run_from_result(read(output)), up_to_date=True)
     with journal:
-        cases = landing_cases(scenario, built)
+        cases = landing_cases(reach, built)
         prepared = _prepare(cases)
-        if not are_compiled(scenario.reach.descent):
+        if not are_compiled(reach.descent):
             say(COMPILING)
             _compile(prepared)
-        found = ReachRun(_solve(scenario.reach, cases, prepared, journal, options, progress))
+        found = ReachRun(_solve(reach, cases, prepared, journal, options, progress))
         taken = {"jobs": options.plan.jobs, "backend": options.plan.backend, "resumed": int(options.resume)}
         attributes = {"mission": "reach"}
         finish_output(

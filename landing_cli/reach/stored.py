@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.body.asteroid import Asteroid
-from landing_cli.body.gravity.field import GravityField, GravityKind
-from landing_cli.body.mesh import Mesh
 from landing_cli.errors import InputRefused
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.reach.records import FACET_COLUMNS, FACET_DTYPE, FacetSolutions, LandingCase
+from landing_cli.results.body_group import body_from_group, body_to_group, number, vector
 from landing_cli.results.store import StoredResult
 from landing_cli.results.tree import (
     Dataset,
@@ -140,7 +139,7 @@ def run_to_tree(run: ReachRun) -> Group:
     cases = {c.case.name: _case_to_group(c, order) for order, c in enumerate(run.cases)}
     return Group(
         {
-            "body": _body_to_group(run.asteroid),
+            "body": body_to_group(run.asteroid),
             "spacecraft": Group({}, craft),
             "cases": Group(cases),
         },
@@ -176,48 +175,14 @@ def run_from_result(result: StoredResult) -> ReachRun:
 
 
 def _run_from_tree(tree: Group) -> ReachRun:
-    asteroid = _body_from_group(tree.group("body"))
+    asteroid = body_from_group(tree.group("body"))
     craft = Spacecraft(**tree.group("spacecraft").attributes)  # type: ignore[arg-type]
     groups = {name: tree.group("cases", name) for name in tree.group("cases").members}
-    ordered = sorted(groups, key=lambda name: _number(groups[name], "order"))
+    ordered = sorted(groups, key=lambda name: number(groups[name], "order"))
     cases = tuple(_case_from_group(name, groups[name], asteroid, craft) for name in ordered)
     if not cases:
         raise ValueError("no case")
     return ReachRun(cases)
-
-
-def _body_to_group(asteroid: Asteroid) -> Group:
-    mesh, gravity = asteroid.mesh, asteroid.gravity
-    members = {
-        "vertices": Dataset(mesh.vertices, "m", "vertices, body frame", ("vertex", "xyz")),
-        "faces": Dataset(mesh.faces, "1", "vertices of each facet, 0-based", ("facet", "corner")),
-        "gravity_params": Dataset(gravity.params, "1", "parameters of the gravity model, SI", ("parameter",)),
-    }
-    return Group(
-        members,
-        {
-            "name": asteroid.name,
-            "rotation_rate_rad_s": asteroid.rotation_rate_rad_s,
-            "gm_m3_s2": asteroid.gm_m3_s2,
-            "gravity": gravity.kind.name.lower(),
-        },
-    )
-
-
-def _body_from_group(group: Group) -> Asteroid:
-    mesh = Mesh(group.dataset("vertices").data, group.dataset("faces").data)
-    if mesh.vertices.shape[1:] != (3,) or mesh.faces.shape[1:] != (3,):
-        raise ValueError("the body's mesh is no list of triangles")
-    if mesh.faces.size and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
-        raise ValueError("a facet refers to a vertex that does not exist")
-    kind = GravityKind[str(group.attributes["gravity"]).upper()]
-    return Asteroid(
-        str(group.attributes["name"]),
-        mesh,
-        _number(group, "rotation_rate_rad_s"),
-        GravityField(kind, group.dataset("gravity_params").data),
-        _number(group, "gm_m3_s2"),
-    )
 
 
 def _case_to_group(result: CaseResult, order: int) -> Group:
@@ -256,8 +221,8 @@ def _trajectories_to_group(solutions: FacetSolutions) -> Group:
 
 
 def _case_from_group(name: str, group: Group, asteroid: Asteroid, craft: Spacecraft) -> CaseResult:
-    facts: dict[str, Any] = {key: _number(group, key) for key in _CASE_NUMBERS}
-    facts |= {key: _vector(group, key) for key in _CASE_VECTORS}
+    facts: dict[str, Any] = {key: number(group, key) for key in _CASE_NUMBERS}
+    facts |= {key: vector(group, key) for key in _CASE_VECTORS}
     facts |= {key: str(group.attributes[key]) for key in _CASE_CHOICES}
     rows = table_rows(group.group("facets"), FACET_COLUMNS)
     nodes = group.group("trajectories").dataset("thrust_nodes_n").data
@@ -275,20 +240,6 @@ def _case_from_group(name: str, group: Group, asteroid: Asteroid, craft: Spacecr
         group.group("boundary") if "boundary" in group.members else None,
         lost,
     )
-
-
-def _number(group: Group, name: str) -> float:
-    value = group.attributes[name]
-    if not isinstance(value, int | float):
-        raise ValueError(f"{name} is no number")
-    return value
-
-
-def _vector(group: Group, name: str) -> NDArray[np.float64]:
-    value = group.attributes[name]
-    if not isinstance(value, np.ndarray) or value.shape != (3,):
-        raise ValueError(f"{name} is no vector")
-    return value.astype(np.float64)
 
 
 def _unfit(what: str, where: str = "") -> InputRefused:

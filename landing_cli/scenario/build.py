@@ -22,7 +22,7 @@ from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.scenario.constants import GRAVITATIONAL_CONSTANT
 from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.messages import KeyPath, Problem, dotted, refusal
-from landing_cli.scenario.schema import Scenario
+from landing_cli.scenario.schema import Reach, Scenario
 from landing_cli.scenario.schema_body import AnyGravity, DipoleGravity, HarmonicsGravity, PointMassGravity
 from landing_cli.sources.shape_files import read_shape
 from landing_cli.sources.shape_search import find_shape
@@ -46,15 +46,15 @@ class Built:
     ----------
     asteroid : Asteroid
     spacecraft : Spacecraft
-    ellipsoid_m : (3,) float, m
-        Semi-axes of the keep-out ellipsoid.
+    ellipsoid_m : (3,) float, m, or None
+        Semi-axes of the keep-out ellipsoid, where the scenario has a ``reach`` section.
     shape_sha256 : str
         Of the shape file.
     """
 
     asteroid: Asteroid
     spacecraft: Spacecraft
-    ellipsoid_m: FloatArray
+    ellipsoid_m: FloatArray | None
     shape_sha256: str
 
 
@@ -78,7 +78,7 @@ def build(loaded: LoadedScenario) -> Built:
     scenario = loaded.scenario
     try:
         asteroid, sha256 = build_asteroid(scenario, loaded.beside)
-        ellipsoid_m = resolve_ellipsoid(scenario, asteroid.mesh)
+        ellipsoid_m = resolve_ellipsoid(scenario.reach, asteroid.mesh) if scenario.reach else None
     except KeyRefused as error:
         problem = Problem(error.path, error.what, error.fix)
         raise refusal([problem], loaded.places, loaded.source) from error
@@ -134,13 +134,13 @@ def build_spacecraft(scenario: Scenario) -> Spacecraft:
     return Spacecraft(**scenario.spacecraft.model_dump())
 
 
-def resolve_ellipsoid(scenario: Scenario, mesh: Mesh) -> FloatArray:
+def resolve_ellipsoid(reach: Reach, mesh: Mesh) -> FloatArray:
     """Find the keep-out ellipsoid, and refuse initial states inside it.
 
     Parameters
     ----------
-    scenario : Scenario
-        Its ``reach`` section is read.
+    reach : Reach
+        The scenario's ``reach`` section.
     mesh : Mesh
         The asteroid's, about the origin that its states refer to.
 
@@ -154,13 +154,13 @@ def resolve_ellipsoid(scenario: Scenario, mesh: Mesh) -> FloatArray:
     InputRefused
         A given ellipsoid leaves vertices outside, or an initial state lies inside it.
     """
-    given = scenario.reach.ellipsoid_m
+    given = reach.ellipsoid_m
     if given == "auto":
         semi_axes = least_volume_ellipsoid(mesh.vertices)
     else:
         semi_axes = np.array(given)
         _check_holds(semi_axes, mesh)
-    _check_states(scenario, semi_axes)
+    _check_states(reach, semi_axes)
     return semi_axes
 
 
@@ -224,8 +224,8 @@ def _check_holds(semi_axes: FloatArray, mesh: Mesh) -> None:
         )
 
 
-def _check_states(scenario: Scenario, semi_axes: FloatArray) -> None:
-    for index, state in enumerate(scenario.reach.initial_states):
+def _check_states(reach: Reach, semi_axes: FloatArray) -> None:
+    for index, state in enumerate(reach.initial_states):
         level = float(np.sqrt(((np.array(state.start_m) / semi_axes) ** 2).sum()))
         if level <= 1.0:
             key = "position_m" if state.position_km is None else "position_km"

@@ -93,11 +93,38 @@ def load(source: str, overrides: Sequence[str] = ()) -> LoadedScenario:
         file, line and dotted key.
     """
     found = locate(source)
-    document = parse(read_text(found), found.name)
+    return load_document(parse(read_text(found), found.name), found.name, found.beside, overrides)
+
+
+def load_document(
+    document: Document, source: str, beside: Path, overrides: Sequence[str] = ()
+) -> LoadedScenario:
+    """Override and check the values of a scenario that were read already.
+
+    Parameters
+    ----------
+    document : Document
+        Its values and their places.
+    source : str
+        What to call it in messages.
+    beside : Path
+        The folder where its shape is searched first.
+    overrides : sequence of str
+        ``dotted.key=value`` each.
+
+    Returns
+    -------
+    LoadedScenario
+
+    Raises
+    ------
+    InputRefused
+        What it says is wrong.
+    """
     for override in overrides:
         document = _with_override(document, override)
-    scenario = from_tree(document.tree, document.places, found.name)
-    return LoadedScenario(scenario, found.name, found.beside, document.places)
+    scenario = from_tree(document.tree, document.places, source)
+    return LoadedScenario(scenario, source, beside, document.places)
 
 
 def parse(text: str, name: str) -> Document:

@@ -21,6 +21,7 @@ from landing_cli.scenario.schema_base import (
     wrong,
 )
 from landing_cli.scenario.schema_body import Body
+from landing_cli.scenario.schema_plan import PlanSection
 from landing_cli.scenario.translate import problems_of
 
 
@@ -195,7 +196,13 @@ class Scenario(Section):
     )
     body: Body = Field(description="the asteroid")
     spacecraft: SpacecraftSection = Field(description="the lander")
-    reach: Reach = Field(description="the reachable domain: `reach run`")
+    reach: Reach | None = Field(None, description="the reachable domain: `reach run`")
+    plan: PlanSection | None = Field(None, description="the flight to one site: `plan bezier` and others")
+
+    def model_post_init(self, context: Any, /) -> None:
+        """Refuse a scenario that asks nothing."""
+        if self.reach is None and self.plan is None:
+            raise wrong("reach", "is missing, and so is plan", "a scenario asks for one of them, or for both")
 
 
 def from_tree(tree: Any, places: Mapping[KeyPath, str] | None = None, source: str = "scenario") -> Scenario:

@@ -1,0 +1,1 @@
+"""How the spacecraft flies to one site, clear of the terrain, with the least fuel."""

@@ -1,0 +1,77 @@
+"""The section of a scenario that a command asks for."""
+
+from __future__ import annotations
+
+from landing_cli.errors import InputRefused
+from landing_cli.scenario.load import LoadedScenario
+from landing_cli.scenario.messages import Problem, refusal
+from landing_cli.scenario.schema import Reach, Scenario
+from landing_cli.scenario.schema_plan import PlanSection
+
+MISSIONS = ("reach", "plan")
+
+
+def reach_section(loaded: LoadedScenario) -> Reach:
+    """Return what a scenario says for ``reach``.
+
+    Parameters
+    ----------
+    loaded : LoadedScenario
+        The checked scenario.
+
+    Returns
+    -------
+    Reach
+
+    Raises
+    ------
+    InputRefused
+        It has no such section.
+    """
+    if loaded.scenario.reach is None:
+        raise _missing(loaded, "reach", "`reach run` needs initial_states, tof_s and final_stage_s there")
+    return loaded.scenario.reach
+
+
+def plan_section(loaded: LoadedScenario) -> PlanSection:
+    """Return what a scenario says for ``plan``.
+
+    Parameters
+    ----------
+    loaded : LoadedScenario
+        The checked scenario.
+
+    Returns
+    -------
+    PlanSection
+
+    Raises
+    ------
+    InputRefused
+        It has no such section.
+    """
+    if loaded.scenario.plan is None:
+        raise _missing(loaded, "plan", "`plan` needs initial_state, site and tof_s there")
+    return loaded.scenario.plan
+
+
+def for_mission(scenario: Scenario, mission: str) -> Scenario:
+    """Drop the sections of other missions: what they say changes no number of this one.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        All of it.
+    mission : {"reach", "plan"}
+        Whose section stays.
+
+    Returns
+    -------
+    Scenario
+    """
+    return scenario.model_copy(update={name: None for name in MISSIONS if name != mission})
+
+
+def _missing(loaded: LoadedScenario, name: str, fix: str) -> InputRefused:
+    problem = Problem((name,), "the scenario has no such section", fix)
+    return refusal([problem], {}, loaded.source)
