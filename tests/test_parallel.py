@@ -61,6 +61,19 @@ def test_leaving_early_takes_less_than_two_seconds_and_leaves_no_thread_or_proce
     assert not _children()
 
 
+@pytest.mark.parametrize("plan", LOCAL, ids=str)
+def test_workers_do_not_run_ahead_of_a_slow_disk(plan, tmp_path: Path):
+    """What is begun but not recorded is what a kill costs: at most two chunks a job."""
+    chunks = [[i] for i in range(40)]
+    begun, taken = tmp_path / "begun", 0
+    with closing(run_chunks(partial(toy_work.notes, begun), chunks, plan)) as answers:
+        for _ in answers:
+            time.sleep(0.05 if taken < 6 else 0)
+            assert len(begun.read_text()) - taken <= 2 * plan.jobs
+            taken += 1
+    assert taken == len(chunks)
+
+
 def test_answers_larger_than_a_pipe_come_through():
     answers = dict(run_chunks(toy_work.big_answer, CHUNKS[:4], WorkPlan(2, "loky")))
     assert {i: a[0, 0] for i, a in answers.items()} == {0: 0, 1: 4, 2: 8, 3: 12}

@@ -15,28 +15,25 @@ from pathlib import Path
 from flip_bits import flip_bits
 from hostile_disks import hostile_disks
 from kill_runs import kill_runs
-from kill_workers import deadly_facet, kill_workers
-from programs import TOY, Reference, Tally, finish, reach_run
+from kill_workers import deadly_facet, finish_deadly, kill_workers
+from programs import TOY, Reference, Tally, reach_run
 from same_numbers import same_numbers
 
 
 def torture(arguments: argparse.Namespace, folder: Path) -> list[Tally]:
-    toy = arguments.program == "toy"
-    program = TOY if toy else reach_run(arguments.scenario, *arguments.set)
+    program = TOY if arguments.program == "toy" else reach_run(arguments.scenario, *arguments.set)
     reference = Reference.make(program, folder)
     tallies = kill_runs(reference, arguments.kills, folder, arguments.seed)
     tallies.append(kill_workers(reference, arguments.workers, folder, arguments.seed))
-    if toy:
-        tallies.append(deadly_facet(reference, folder))
+    tallies.append(deadly_facet(reference, folder))
     tallies += hostile_disks(reference, folder)
     tallies.append(same_numbers(reference, folder, dask=not arguments.no_dask))
     copy = folder / "flipped.h5"
-    shutil.copy(folder / "undisturbed-threads" / "run.h5", copy)
+    shutil.copy(reference.result, copy)
     tallies.append(flip_bits("result", copy, arguments.flips))
-    if toy:
-        output = folder / "partial" / "run.h5"
-        finish(program.command(output, "loky", 2, "--deadly", "37"))
-        tallies.append(flip_bits("journal", output.with_name("run.h5.journal"), arguments.flips // 4))
+    output = folder / "partial" / "run.h5"
+    finish_deadly(reference, output)
+    tallies.append(flip_bits("journal", output.with_name("run.h5.journal"), arguments.flips // 4))
     return tallies
 
 

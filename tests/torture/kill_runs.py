@@ -6,6 +6,7 @@ import os
 import random
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -19,7 +20,6 @@ from landing_cli.results.store import read
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 ANSWERED = {signal.SIGINT: 130, signal.SIGTERM: 143}
 ANSWER_S, ORPHANS_S = 2.0, 4.0
-START_UP_S = 0.3  # before this, the interpreter may not yet have reached our first line
 JOBS = 2
 
 
@@ -37,6 +37,8 @@ def kill_runs(reference: Reference, kills: int, folder: Path, seed: int = 0) -> 
         output = folder / f"kill-{number}" / "run.h5"
         complaints = _kill_once(reference, output, backend, caught, whole_group, after)
         tallies[backend].record(f"{caught.name} to the {target} after {after:.2f} s", complaints)
+        if number % 10 == 9:
+            print(f"{number + 1} of {kills} runs killed", file=sys.stderr, flush=True)
     return list(tallies.values())
 
 
@@ -44,62 +46,80 @@ def _kill_once(
     reference: Reference, output: Path, backend: str, caught: signal.Signals, whole_group: bool, after: float
 ) -> list[str]:
     output.parent.mkdir(parents=True)
+    trace = {"TORTURE_TRACE": str(trace_of(output))}
     process = subprocess.Popen(
         reference.program.command(output, backend, JOBS),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
-        env=environment(),
+        env=environment(**trace),
         start_new_session=True,
     )
+    armed = False
     try:
         process.wait(timeout=after)
     except subprocess.TimeoutExpired:
+        armed = _is_caught(process.pid, signal.SIGTERM)  # the interpreter has reached our first lines
         (os.killpg if whole_group else os.kill)(process.pid, caught)
     killed = time.monotonic()
     assert process.stderr is not None
     told = process.stderr.read()  # until the last process that holds it is gone
     code = process.wait()
-    complaints = _answer(code, caught, time.monotonic() - killed, told, after, output)
+    complaints = _answer(code, caught, time.monotonic() - killed, told, armed, output)
     complaints += _orphans(process.pid, killed)
     recorded, wrong = _on_disk(output)
-    complaints += wrong + _solved_again(reference, output, recorded)
     before = _traced(output)
-    complaints += reference.resumed(output, backend)
+    lost = set() if output.exists() else set(before) - set(recorded)
+    if len(lost) > 2 * JOBS:
+        wrong.append(f"{len(lost)} chunks of {reference.program.chunk_facets} facets to solve again")
+    complaints += wrong + reference.resumed(output, backend, trace)
     twice = set(recorded) & set(_traced(output)[len(before) :])
     return complaints + ([f"recorded chunks solved again: {sorted(twice)}"] if twice else [])
 
 
+def _is_caught(pid: int, number: signal.Signals) -> bool:
+    """Whether a process has a handler for a signal, which is not so before our first lines have run."""
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return False
+    return bool(int(status.split("SigCgt:")[1].split()[0], 16) >> (number - 1) & 1)
+
+
 def _answer(
-    code: int, caught: signal.Signals, seconds: float, told: str, after: float, output: Path
+    code: int, caught: signal.Signals, seconds: float, told: str, armed: bool, output: Path
 ) -> list[str]:
     """A run that is asked to stop says so in one line, with its code, in time."""
     lines = told.strip().splitlines()
     state = "stored" if output.exists() else "recording" if journal_path(output).exists() else "not begun"
     ending = f" ({state}): {told.strip()[-300:]!r}"
-    complaints = [f"a traceback{ending}"] if "Traceback" in told and after > START_UP_S else []
-    if code == 0 or caught not in ANSWERED:
+    complaints = [f"a traceback{ending}"] if "Traceback" in told and (armed or code == 0) else []
+    if code == 0:
+        return complaints + ([] if output.exists() else [f"ended with 0 and no result{ending}"])
+    if not armed or caught not in ANSWERED:
         return complaints
-    if code != ANSWERED[caught] and after > START_UP_S:
+    if code != ANSWERED[caught]:
         complaints.append(f"exit code {code}{ending}")
     if seconds > ANSWER_S:
         complaints.append(f"took {seconds:.1f} s to end")
+    if [line for line in lines if line.startswith("interrupted by")] != lines[-1:]:
+        complaints.append(f"does not end with its one line{ending}")
     if journal_path(output).exists() and not (lines and "--resume" in lines[-1]):
-        complaints.append(f"does not tell of --resume: {lines[-1:]}")
+        complaints.append(f"does not tell of --resume{ending}")
     return complaints
 
 
 def _orphans(session: int, killed: float) -> list[str]:
     alive: list[str] = []
     while time.monotonic() < killed + ORPHANS_S:
-        alive = [name for pid, name in _session_members(session)]
+        alive = [name for pid, name in session_members(session)]
         if not alive:
             return []
         time.sleep(0.05)
     return [f"orphans after {ORPHANS_S} s: {alive}"]
 
 
-def _session_members(session: int) -> list[tuple[int, str]]:
+def session_members(session: int) -> list[tuple[int, str]]:
     found = []
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
@@ -129,18 +149,6 @@ def _on_disk(output: Path) -> tuple[list[str], list[str]]:
 
 
 def _traced(output: Path) -> list[str]:
-    """Chunks that the solver finished, in the journal's words; only the toy tells."""
+    """Chunks that were begun, in the journal's words."""
     trace = trace_of(output)
-    if not trace.exists():
-        return []
-    from toy_run import CASES
-
-    pairs = (line.split("/") for line in trace.read_text().split())
-    return [f"{CASES[int(seed)]}/{first}" for seed, first in pairs]
-
-
-def _solved_again(reference: Reference, output: Path, recorded: list[str]) -> list[str]:
-    if not reference.program.traces or output.exists():
-        return []
-    again = len(set(_traced(output)) - set(recorded))
-    return [f"{again} chunks to solve again"] if again > 2 * JOBS else []
+    return trace.read_text().splitlines() if trace.exists() else []
