@@ -22,6 +22,7 @@ from landing_cli.errors import InputRefused, OutputRefused
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.reach.records import FacetSolutions, LandingCase, Verdict, blank_rows
 from landing_cli.reach.stored import CaseResult, ReachRun, run_from_result, run_to_tree
+from landing_cli.reach.summary import summarise
 from landing_cli.results.identity import RunIdentity
 from landing_cli.results.output import OutputState, finish_output, inspect_output, journal_path, open_output
 from landing_cli.results.store import read, write
@@ -37,7 +38,7 @@ def make_run(facets: int = 12, seed: int = 0) -> ReachRun:
     rng = np.random.default_rng(seed)
     vertices = rng.normal(size=(8, 3))
     faces = np.array([[i % 8, (i + 1) % 8, (i + 2) % 8] for i in range(facets)])
-    gravity = GravityField(GravityKind.DIPOLE, np.array([4.892, 0.5, 100.0]))
+    gravity = GravityField(GravityKind.DIPOLE, np.array([2.4, 50.0, 0.0, 2.492, -50.0, 0.0]))
     body = Asteroid("cube", Mesh(vertices, faces), 4.07e-4, gravity, 4.892)
     cases = []
     for order, tof in enumerate((900.0, 700.0)):
@@ -59,11 +60,10 @@ def make_run(facets: int = 12, seed: int = 0) -> ReachRun:
             np.radians(60.0),
         )
         section = Group({"facet": Dataset(np.arange(3), "1", "facets of the section", ("point",))}, {"N": 3})
-        summary = {"facets": facets, "delta_v_m_s": {"min": 1.5, "median": None, "max": 2.5}}
+        solutions = FacetSolutions(rows, nodes)
+        summary = {**summarise(body.mesh, solutions), "delta_v_m_s": {"min": 1.5, "median": None, "max": 2.5}}
         lost = {3: "its worker process died of SIGSEGV"} if order else {}
-        cases.append(
-            CaseResult(case, "pole", FacetSolutions(rows, nodes), summary, section if order else None, lost)
-        )
+        cases.append(CaseResult(case, "pole", solutions, summary, section if order else None, lost))
     return ReachRun(tuple(cases))
 
 

@@ -15,6 +15,7 @@ from landing_cli.body.mesh import Mesh
 from landing_cli.errors import InputRefused
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.reach.records import FACET_COLUMNS, FACET_DTYPE, FacetSolutions, LandingCase
+from landing_cli.reach.stored_checks import check_asteroid, check_case, check_spacecraft
 from landing_cli.results.store import StoredResult
 from landing_cli.results.tree import (
     Dataset,
@@ -164,25 +165,29 @@ def run_from_result(result: StoredResult) -> ReachRun:
     Raises
     ------
     InputRefused
-        If the file is of another mission, or lacks a part.
+        If the file is of another mission, lacks a part, or holds what no run can have found.
     """
     if result.mission != MISSION:
         told = f"holds a result of '{result.mission}', not of '{MISSION}'"
         raise InputRefused(told, where=str(result.path), fix="name a file that `reach run` wrote")
     try:
         return _run_from_tree(result.tree)
-    except (KeyError, ValueError, TypeError, IndexError) as error:
+    except (KeyError, ValueError, TypeError, IndexError, OverflowError) as error:
         raise _unfit(f"lacks a part or holds a wrong one: {error}", str(result.path)) from error
 
 
 def _run_from_tree(tree: Group) -> ReachRun:
     asteroid = _body_from_group(tree.group("body"))
+    check_asteroid(asteroid)
     craft = Spacecraft(**tree.group("spacecraft").attributes)  # type: ignore[arg-type]
+    check_spacecraft(craft)
     groups = {name: tree.group("cases", name) for name in tree.group("cases").members}
     ordered = sorted(groups, key=lambda name: _number(groups[name], "order"))
     cases = tuple(_case_from_group(name, groups[name], asteroid, craft) for name in ordered)
     if not cases:
         raise ValueError("no case")
+    for case in cases:
+        check_case(case)
     return ReachRun(cases)
 
 
@@ -206,10 +211,6 @@ def _body_to_group(asteroid: Asteroid) -> Group:
 
 def _body_from_group(group: Group) -> Asteroid:
     mesh = Mesh(group.dataset("vertices").data, group.dataset("faces").data)
-    if mesh.vertices.shape[1:] != (3,) or mesh.faces.shape[1:] != (3,):
-        raise ValueError("the body's mesh is no list of triangles")
-    if mesh.faces.size and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
-        raise ValueError("a facet refers to a vertex that does not exist")
     kind = GravityKind[str(group.attributes["gravity"]).upper()]
     return Asteroid(
         str(group.attributes["name"]),

@@ -42,6 +42,8 @@ def table(tallies: list[Tally]) -> str:
     lines = [f"{'what':<{width}}  tried  passed"]
     for tally in tallies:
         lines.append(f"{tally.name:<{width}}  {tally.tried:5d}  {tally.passed:6d}")
+        if tally.stages:
+            lines.append("    " + ", ".join(f"{stage} {n}" for stage, n in sorted(tally.stages.items())))
         lines += [f"    {failure}" for failure in tally.failures[:5]]
     return "\n".join(lines)
 

@@ -35,7 +35,8 @@ def kill_runs(reference: Reference, kills: int, folder: Path, seed: int = 0) -> 
         after = chance.uniform(0.05, 1.1 * reference.seconds[backend])
         target = "group" if whole_group else "parent"
         output = folder / f"kill-{number}" / "run.h5"
-        complaints = _kill_once(reference, output, backend, caught, whole_group, after)
+        stage, complaints = _kill_once(reference, output, backend, caught, whole_group, after)
+        tallies[backend].stages[stage] += 1
         tallies[backend].record(f"{caught.name} to the {target} after {after:.2f} s", complaints)
         if number % 10 == 9:
             print(f"{number + 1} of {kills} runs killed", file=sys.stderr, flush=True)
@@ -44,9 +45,10 @@ def kill_runs(reference: Reference, kills: int, folder: Path, seed: int = 0) -> 
 
 def _kill_once(
     reference: Reference, output: Path, backend: str, caught: signal.Signals, whole_group: bool, after: float
-) -> list[str]:
+) -> tuple[str, list[str]]:
     output.parent.mkdir(parents=True)
     trace = {"TORTURE_TRACE": str(trace_of(output))}
+    begun = time.monotonic()
     process = subprocess.Popen(
         reference.program.command(output, backend, JOBS),
         stdout=subprocess.DEVNULL,
@@ -54,12 +56,15 @@ def _kill_once(
         text=True,
         env=environment(**trace),
         start_new_session=True,
+        preexec_fn=_mind_signals,
     )
-    armed = False
+    armed, stage = False, "ended before"
     try:
         process.wait(timeout=after)
+        reference.seconds[backend] = time.monotonic() - begun
     except subprocess.TimeoutExpired:
         armed = _is_caught(process.pid, signal.SIGTERM)  # the interpreter has reached our first lines
+        stage = _stage(output)
         (os.killpg if whole_group else os.kill)(process.pid, caught)
     killed = time.monotonic()
     assert process.stderr is not None
@@ -74,7 +79,20 @@ def _kill_once(
         wrong.append(f"{len(lost)} chunks of {reference.program.chunk_facets} facets to solve again")
     complaints += wrong + reference.resumed(output, backend, trace)
     twice = set(recorded) & set(_traced(output)[len(before) :])
-    return complaints + ([f"recorded chunks solved again: {sorted(twice)}"] if twice else [])
+    return stage, complaints + ([f"recorded chunks solved again: {sorted(twice)}"] if twice else [])
+
+
+def _stage(output: Path) -> str:
+    """How far a run has come."""
+    if output.exists():
+        return "stored"
+    return "solving" if trace_of(output).exists() else "starting"
+
+
+def _mind_signals() -> None:
+    """Undo what ``nohup`` or a background job made this process ignore, and its children with it."""
+    for number in SIGNALS[1:]:
+        signal.signal(number, signal.SIG_DFL)
 
 
 def _is_caught(pid: int, number: signal.Signals) -> bool:
@@ -110,11 +128,12 @@ def _answer(
 
 
 def _orphans(session: int, killed: float) -> list[str]:
-    alive: list[str] = []
-    while time.monotonic() < killed + ORPHANS_S:
+    while True:
         alive = [name for pid, name in session_members(session)]
         if not alive:
             return []
+        if time.monotonic() > killed + ORPHANS_S:
+            break
         time.sleep(0.05)
     return [f"orphans after {ORPHANS_S} s: {alive}"]
 

@@ -7,10 +7,12 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from landing_cli.results.output import journal_path
 from landing_cli.results.store import read
 
 HERE = Path(__file__).resolve().parent
@@ -107,6 +109,7 @@ class Tally:
     name: str
     tried: int = 0
     failures: list[str] = field(default_factory=list)
+    stages: Counter[str] = field(default_factory=Counter)  # how many met the run at which stage
 
     def record(self, case: str, complaints: Sequence[str]) -> None:
         self.tried += 1
@@ -121,11 +124,11 @@ class Tally:
 
 @dataclass(frozen=True)
 class Reference:
-    """The undisturbed run that every disturbed one must equal."""
+    """The undisturbed run that every disturbed one must equal, and how long one takes."""
 
     program: Program
     digest: str
-    seconds: Mapping[str, float]
+    seconds: dict[str, float]
     result: Path
 
     @classmethod
@@ -144,9 +147,12 @@ class Reference:
         self, output: Path, backend: str = "threads", variables: Mapping[str, str] | None = None
     ) -> list[str]:
         """Resume a run and say what is wrong with the outcome."""
+        from_nothing = not any(path.exists() for path in (output, journal_path(output)))
         ended = finish(self.program.command(output, backend, 2, "--resume"), variables)
         if ended.code != 0:
             return [f"--resume ended with {ended.code}: {ended.stderr.strip()[-200:]}"]
+        if from_nothing:  # the machine may be busier, or idler, than it was
+            self.seconds[backend] = ended.seconds
         complaints = [] if digest_of(output) == self.digest else ["the resumed result differs"]
         left = {p.name for p in output.parent.iterdir()} - {output.name}
         return complaints + ([f"left behind: {sorted(left)}"] if left else [])

@@ -49,6 +49,7 @@ def run(arguments: Sequence[str]) -> int:
     from landing_cli.errors import PartialResult
     from landing_cli.reach.recorded import solve_recorded
     from landing_cli.reach.stored import CaseResult, ReachRun, run_to_tree
+    from landing_cli.reach.summary import summarise
     from landing_cli.results.identity import RunIdentity
     from landing_cli.results.output import finish_output, open_output
     from landing_cli.results.provenance import Stopwatch
@@ -69,7 +70,8 @@ def run(arguments: Sequence[str]) -> int:
         for seed, (name, case) in enumerate(zip(CASES, _cases(), strict=True)):
             work = partial(solve, seed)
             solutions, lost = solve_recorded(journal, name, chunks, work, plan)
-            cases.append(CaseResult(case, "pole", solutions, {"facets": FACETS}, lost=lost))
+            summary = summarise(case.asteroid.mesh, solutions)
+            cases.append(CaseResult(case, "pole", solutions, summary, lost=lost))
         result = ReachRun(tuple(cases))
         finish_output(journal, run_to_tree(result), {}, watch.provenance(), complete=not result.lost_facets)
     print(f"wrote {choices.output}")
