@@ -119,6 +119,8 @@ def solutions_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> FacetSolutions:
     rows, nodes = arrays.get("rows"), arrays.get("thrust_nodes_n")
     if rows is None or nodes is None or rows.dtype != FACET_DTYPE or nodes.dtype != np.float64:
         raise _unfit("a journal record holds other columns than this version writes")
+    if (rows["thrust_nodes"] < 0).any():
+        raise _unfit("a journal record holds a negative number of thrust nodes")
     if rows.ndim != 1 or nodes.shape != (rows["thrust_nodes"].sum(dtype=np.int64), 3):
         raise _unfit("a journal record's thrust nodes do not fit its rows")
     return FacetSolutions(rows, nodes)

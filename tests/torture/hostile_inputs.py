@@ -1,6 +1,6 @@
-"""Scenarios and shapes from strangers, each by name: refused, or accepted where that is right, at little cost.
+"""Scenarios and shapes from strangers, each by name: refused, or accepted where right, at little cost.
 
-``python hostile_inputs.py FOLDER`` reads each in a process of its own and prints what came of it.
+``python hostile_inputs.py`` reads each in a process of its own and prints what came of it.
 """
 
 from __future__ import annotations
@@ -88,16 +88,17 @@ def _rows(*changes: tuple[str, str], more: str = "") -> bytes:
     return (text + more).encode()
 
 
-def _second() -> str:
-    vertices, faces = OCTAHEDRON.split("f ", 1)[0], OCTAHEDRON.splitlines()[6:]
-    moved = [f"v {float(x) + 2000} {y} {z}" for _, x, y, z in map(str.split, vertices.splitlines())]
-    return "\n".join([*moved, *(" ".join(["f", *(str(int(i) + 6) for i in f.split()[1:])]) for f in faces), ""])
+VERTICES = [line.split()[1:] for line in OCTAHEDRON.splitlines() if line[0] == "v"]
+FACETS = [line.split()[1:] for line in OCTAHEDRON.splitlines() if line[0] == "f"]
 
 
-FLAT = "\n".join(line.replace(" 200", " 0").replace(" -200", " 0") for line in OCTAHEDRON.splitlines())
-INVERTED = "\n".join(
-    " ".join(line.split()[i] for i in (0, 2, 1, 3)) if line[0] == "f" else line for line in OCTAHEDRON.splitlines()
-)
+def _obj(vertices: list[list[str]], facets: list[list[str]]) -> bytes:
+    lines = [f"v {' '.join(v)}" for v in vertices] + [f"f {' '.join(f)}" for f in facets]
+    return "\n".join([*lines, ""]).encode()
+
+
+MOVED = [[str(float(x) + 2000), y, z] for x, y, z in VERTICES]
+TWO = _obj(VERTICES + MOVED, FACETS + [[str(int(i) + 6) for i in f] for f in FACETS])
 SHAPES: dict[str, tuple[str, Made, tuple[str, ...]]] = {
     "sound": (".obj", _rows(), ()),
     "mtllib to a FIFO": (".obj", _rows(more="mtllib trap.mtl\nusemtl x\n"), ()),
@@ -111,9 +112,9 @@ SHAPES: dict[str, tuple[str, Made, tuple[str, ...]]] = {
     "truncated in a line": (".obj", _rows()[:-4], ("line 14", "cut short")),
     "truncated between lines": (".obj", _rows()[:-8], ("open",)),
     "empty": (".obj", b"", ("0 vertices and 0 facets",)),
-    "flat": (".obj", FLAT.encode(), ("flat",)),
-    "inverted": (".obj", INVERTED.encode(), ("inwards",)),
-    "two bodies": (".obj", _rows(more=_second()), ("facet 8", "2 separate surfaces")),
+    "flat": (".obj", _obj([[x, y, "0"] for x, y, _ in VERTICES], FACETS), ("flat",)),
+    "inverted": (".obj", _obj(VERTICES, [[a, c, b] for a, b, c in FACETS]), ("inwards",)),
+    "two bodies": (".obj", TWO, ("facet 8", "2 separate surfaces")),
     "non-manifold": (".obj", _rows(more="v 0 0 500\nf 1 3 7\n"), ("edge",)),
     "giant counts": (".tab", b"4000000000 8000000000\n" + _rows(), ("line 1", "4000000000")),
     "absurd counts": (".tab", b"9" * 4000 + b"\n", ("line 1",)),

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from programs import Reference, Tally, environment, trace_of
@@ -36,7 +37,7 @@ def kill_runs(reference: Reference, kills: int, folder: Path, seed: int = 0) -> 
         target = "group" if whole_group else "parent"
         output = folder / f"kill-{number}" / "run.h5"
         stage, complaints = _kill_once(reference, output, backend, caught, whole_group, after)
-        tallies[backend].stages[stage] += 1
+        tallies[backend].notes[stage] += 1
         tallies[backend].record(f"{caught.name} to the {target} after {after:.2f} s", complaints)
         if number % 10 == 9:
             print(f"{number + 1} of {kills} runs killed", file=sys.stderr, flush=True)
@@ -139,17 +140,26 @@ def _orphans(session: int, killed: float) -> list[str]:
 
 
 def session_members(session: int) -> list[tuple[int, str]]:
-    found = []
+    """Pid and command line of the living processes of a session."""
+    return [(pid, name) for pid, _, own, name in _processes() if own == session]
+
+
+def children(parent: int) -> list[int]:
+    """Pids of the Python processes that a Dask nanny watches over."""
+    return [pid for pid, own, _, name in _processes() if own == parent and "resource_tracker" not in name]
+
+
+def _processes() -> Iterator[tuple[int, int, int, str]]:
+    """Pid, parent, session and command line of every living process."""
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             try:
-                state, *fields = (entry / "stat").read_text().rsplit(")", 1)[1].split()
+                state, parent, _, session, *_ = (entry / "stat").read_text().rsplit(")", 1)[1].split()
                 name = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
             except OSError:
                 continue
-            if state != "Z" and int(fields[2]) == session:
-                found.append((int(entry.name), name))
-    return found
+            if state != "Z":
+                yield int(entry.name), int(parent), int(session), name
 
 
 def _on_disk(output: Path) -> tuple[list[str], list[str]]:

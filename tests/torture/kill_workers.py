@@ -11,11 +11,13 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-from kill_runs import session_members
+from cluster import ADDRESS, cluster
+from kill_runs import children, session_members
 from programs import Ended, Reference, Tally, environment, finish
 
 from landing_cli.reach.records import Verdict
 from landing_cli.reach.stored import run_from_result
+from landing_cli.results.output import journal_path
 from landing_cli.results.store import read
 
 DEADLY_FACET = 37  # of the second case
@@ -42,12 +44,36 @@ def kill_workers(reference: Reference, runs: int, folder: Path, seed: int = 0) -
                 with suppress(ProcessLookupError):
                     os.kill(chance.choice(workers), chance.choice([signal.SIGKILL, signal.SIGSEGV]))
                     killed += 1
-        told = process.stderr.read() if process.stderr else ""
-        complaints = [] if process.returncode == 0 else [f"exit code {process.returncode}: {told[-200:]}"]
-        if not complaints and read(output).digest != reference.digest:
-            complaints.append("the result differs")
-        tally.record(f"run {number}, {killed} workers killed", complaints)
+        tally.record(f"run {number}, {killed} workers killed", _unharmed(reference, process, output))
     return tally
+
+
+def kill_dask_workers(reference: Reference, runs: int, folder: Path, seed: int = 0) -> Tally:
+    """Kill Dask workers at random during runs; their nannies start them again."""
+    tally, chance = Tally(f"{reference.program.name}: Dask workers killed"), random.Random(seed)
+    with cluster(folder) as nannies:
+        for number in range(runs):
+            output = folder / f"dask-workers-{number}" / "run.h5"
+            command = reference.program.command(output, "dask", 1, "--scheduler", ADDRESS)
+            pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+            process = subprocess.Popen(command, text=True, env=environment(), **pipes)
+            killed = 0
+            while process.poll() is None:
+                time.sleep(chance.uniform(0.1, 0.4))
+                workers = [pid for nanny in nannies for pid in children(nanny.pid)]
+                if workers and killed < 2 and journal_path(output).exists():
+                    with suppress(ProcessLookupError):
+                        os.kill(chance.choice(workers), signal.SIGKILL)
+                        killed += 1
+            tally.record(f"run {number}, {killed} workers killed", _unharmed(reference, process, output))
+    return tally
+
+
+def _unharmed(reference: Reference, process: subprocess.Popen[str], output: Path) -> list[str]:
+    told = process.stderr.read() if process.stderr else ""
+    if process.returncode:
+        return [f"exit code {process.returncode}: {told[-200:]}"]
+    return [] if read(output).digest == reference.digest else ["the result differs"]
 
 
 def deadly_facet(reference: Reference, folder: Path) -> Tally:

@@ -109,7 +109,7 @@ class Tally:
     name: str
     tried: int = 0
     failures: list[str] = field(default_factory=list)
-    stages: Counter[str] = field(default_factory=Counter)  # how many met the run at which stage
+    notes: Counter[str] = field(default_factory=Counter)  # how many of which kind
 
     def record(self, case: str, complaints: Sequence[str]) -> None:
         self.tried += 1
