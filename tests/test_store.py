@@ -439,9 +439,10 @@ def test_a_disk_too_full_for_the_result_keeps_the_journal_and_leaves_no_temporar
 
 
 def test_journal_and_store_cost_at_most_fifty_milliseconds_a_case(tmp_path: Path) -> None:
-    """2692 facets with 40 thrust nodes each, in chunks of 64; the process is warm."""
+    """2692 facets with 40 thrust nodes each; the least of ten, as the machine may be busy."""
     import time
 
+    from landing_cli.reach.facet_work import CHUNK_FACETS
     from landing_cli.reach.stored import solutions_to_arrays
 
     run = make_run(2692)
@@ -451,12 +452,13 @@ def test_journal_and_store_cost_at_most_fifty_milliseconds_a_case(tmp_path: Path
     solutions = FacetSolutions(rows, rng.normal(size=(2692 * 40, 3)))
     run = ReachRun((dataclasses.replace(run.cases[0], solutions=solutions),))
     spent = []
-    for attempt in range(5):
+    for attempt in range(10):
         start = time.process_time()
         journal = open_output(tmp_path / f"{attempt}.h5", IDENTITY)
         assert journal is not None
-        for i in range(0, 2692, 64):
-            part = FacetSolutions(rows[i : i + 64], solutions.thrust_nodes_n[40 * i : 40 * (i + 64)])
+        for i in range(0, 2692, CHUNK_FACETS):
+            nodes = solutions.thrust_nodes_n[40 * i : 40 * (i + CHUNK_FACETS)]
+            part = FacetSolutions(rows[i : i + CHUNK_FACETS], nodes)
             journal.append(f"{i}", solutions_to_arrays(part))
         finish_output(journal, run_to_tree(run), {}, PROVENANCE, complete=True)
         spent.append(time.process_time() - start)

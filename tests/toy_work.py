@@ -61,3 +61,13 @@ def who_am_i(chunk: Sequence[int]) -> dict[str, object]:
         "masked": signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []),
         "blas": os.environ.get("OPENBLAS_NUM_THREADS"),
     }
+
+
+class Unloadable:
+    """Work that ends every interpreter that unpacks it."""
+
+    def __call__(self, chunk: Sequence[int]) -> None:
+        raise AssertionError
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return os._exit, (3,)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite, pi
+from math import pi
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -19,6 +19,26 @@ from landing_cli.results.tree import Dataset, Group
 if TYPE_CHECKING:
     from landing_cli.reach.stored import CaseResult
 
+# what a scenario may ask for at most, or an answer to one may be
+_LARGEST = {
+    "gm_m3_s2": 1e15,
+    "mass_kg": 1e7,
+    "thrust_max_n": 1e7,
+    "isp_s": 1e6,
+    "propellant_kg": 1e7,
+    "tof_s": 1e7,
+    "final_stage_s": 1e7,
+    "position_m": 1e9,
+    "velocity_m_s": 1e6,
+    "ellipsoid_m": 1e9,
+    "vertices": 1e9,
+    "rotation_rate_rad_s": 1.0,
+    "gravity_params": 1e33,
+    "handover_position_m": 1e9,
+    "handover_velocity_m_s": 1e6,
+    "costates": 1e12,
+    "thrust_nodes_n": 1e7,
+}
 _PARAMETERS = {GravityKind.POINT_MASS: 1, GravityKind.HARMONICS: 7, GravityKind.DIPOLE: 6}
 _CHOICES = {n: get_args(h) for n, h in get_type_hints(LandingCase).items() if get_origin(h) is Literal}
 
@@ -41,9 +61,9 @@ def check_asteroid(asteroid: Asteroid) -> None:
         raise ValueError("the body's mesh is no list of triangles")
     if not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
         raise ValueError("a facet refers to a vertex that does not exist")
-    _all_finite("vertices", mesh.vertices)
-    _positive(gm_m3_s2=asteroid.gm_m3_s2)
-    _all_finite("rotation_rate_rad_s", np.array(asteroid.rotation_rate_rad_s))
+    _bounded("vertices", mesh.vertices)
+    _positive("gm_m3_s2", asteroid.gm_m3_s2)
+    _bounded("rotation_rate_rad_s", asteroid.rotation_rate_rad_s)
     _check_gravity(asteroid.gravity)
 
 
@@ -60,7 +80,9 @@ def check_spacecraft(craft: Spacecraft) -> None:
     ValueError
         If a number is not positive and finite.
     """
-    _positive(**{name: value for name, value in vars(craft).items() if value is not None})
+    for name, value in vars(craft).items():
+        if value is not None:
+            _positive(name, value)
 
 
 def check_case(result: CaseResult) -> None:
@@ -77,12 +99,14 @@ def check_case(result: CaseResult) -> None:
         If a quantity is impossible, a choice unknown, or a facet not of this body.
     """
     case, facets = result.case, len(result.case.asteroid.mesh.faces)
-    _positive(tof_s=case.tof_s, final_stage_s=case.final_stage_s, descent_s=case.descent_s)
-    _positive(**{f"ellipsoid_m[{i}]": axis for i, axis in enumerate(case.ellipsoid_m.tolist())})
+    for name in ("tof_s", "final_stage_s", "ellipsoid_m"):
+        _positive(name, getattr(case, name))
+    if not case.descent_s > 0.0:
+        raise ValueError("final_stage_s is longer than tof_s")
     if not 0.0 < case.glide_slope_half_angle_rad <= pi / 2:
         raise ValueError("glide_slope_half_angle_rad is not between 0 and pi/2")
     for name in ("position_m", "velocity_m_s"):
-        _all_finite(name, getattr(case, name))
+        _bounded(name, getattr(case, name))
     for name, allowed in _CHOICES.items():
         if getattr(case, name) not in allowed:
             raise ValueError(f"{name} is none of {', '.join(allowed)}")
@@ -115,14 +139,17 @@ def check_rows(solutions: FacetSolutions, facets: int) -> None:
         raise ValueError("the facets do not ascend")
     if (rows["thrust_nodes"] < 0).any():
         raise ValueError("a facet has a negative number of thrust nodes")
+    _bounded("thrust_nodes_n", solutions.thrust_nodes_n)
     for column in FACET_COLUMNS:
+        if column.name in _LARGEST:
+            _bounded(column.name, np.nan_to_num(rows[column.name], nan=0.0, posinf=np.inf, neginf=-np.inf))
         if column.flags is not None and not np.isin(rows[column.name], list(column.flags)).all():
             raise ValueError(f"{column.name} holds a value without a meaning")
 
 
 def _check_gravity(field: GravityField) -> None:
     params = field.params
-    _all_finite("gravity_params", params)
+    _bounded("gravity_params", params)
     if field.kind is GravityKind.POLYHEDRON:
         sizes = params[:2] if len(params) >= 3 else np.array([-1.0])
         expected = 3 + 27 * sizes[0] + 20 * sizes[-1]  # the records of polyhedron_records
@@ -167,15 +194,16 @@ def _check_printable(path: str, values: Mapping[str, Any]) -> None:
             raise ValueError(f"{path}/{name} is neither number nor word")
 
 
-def _positive(**values: float) -> None:
-    for name, value in values.items():
-        if not (isinstance(value, int | float) and isfinite(value) and value > 0.0):
-            raise ValueError(f"{name} is not positive")
+def _bounded(name: str, values: Any) -> None:
+    array = np.asarray(values)
+    if array.dtype.kind not in "iuf" or not (np.abs(array) <= _LARGEST[name]).all():
+        raise ValueError(f"{name} holds what is no number, or an absurd one")
 
 
-def _all_finite(name: str, array: NDArray[Any]) -> None:
-    if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
-        raise ValueError(f"{name} holds what is no finite number")
+def _positive(name: str, values: Any) -> None:
+    _bounded(name, values)
+    if not (np.asarray(values) > 0.0).all():
+        raise ValueError(f"{name} is not positive")
 
 
 def _all_within(name: str, indices: NDArray[Any], count: int) -> None:
