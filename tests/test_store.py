@@ -315,6 +315,18 @@ def test_a_giant_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
         read(path)
 
 
+def test_gigabytes_of_something_else_are_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from landing_cli.results.store import files
+
+    path = tmp_path / "zeros.h5"
+    path.touch()
+    os.truncate(path, 3 << 30)
+    monkeypatch.setattr(files, "read_whole", lambda _: pytest.fail("was read"))
+    with pytest.raises(InputRefused, match="no HDF5"):
+        read(path)
+    assert inspect_output(path, IDENTITY).state is OutputState.FOREIGN
+
+
 def test_a_result_of_another_mission_is_not_taken_for_a_reach_run(tmp_path: Path) -> None:
     path = tmp_path / "plan.h5"
     write(path, Group(), {**ROOT, "mission": "plan"}, {})
