@@ -2,6 +2,7 @@
 VENV ?= .venv
 PYTHON ?=
 SCENARIO ?= bennu.yaml
+KILLS ?= 200
 RESULT ?= runs/$(basename $(notdir $(SCENARIO)))-reach-run.h5
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
@@ -45,8 +46,8 @@ smoke: $(RUN_STAMP) ## one short real run, re-flown by another integrator
 bench: $(DEV_STAMP) ## time the solvers against the usual ones on the same facets
 	$(BIN)/python -m bench
 
-torture: $(DEV_STAMP) ## kill runs, fill disks, flip bits; print what was tried and what passed
-	$(BIN)/python tests/torture --kills 200
+torture: $(DEV_STAMP) ## kill real runs, fill disks, forge files; print what was tried and what passed
+	$(BIN)/python tests/torture --kills $(KILLS) --workers 10
 
 validate: $(DEV_STAMP) ## regenerate docs/validation.md and its figures
 	$(BIN)/python docs/validate.py

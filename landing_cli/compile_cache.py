@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 from pathlib import Path
 from typing import Any
 
@@ -29,17 +30,33 @@ def fingerprint(package: Path) -> str:
 
 
 def use_own_cache() -> None:
-    """Point numba to this version's folder, unless NUMBA_CACHE_DIR is set or no folder can be made."""
+    """Point numba to this version's folder, unless NUMBA_CACHE_DIR is set.
+
+    It lies in the user's cache, or, where that cannot be written (a container, a cluster node without a
+    home), in a folder of the user's own among the temporary files.
+    """
     os.environ.setdefault("NUMBA_OPT", OPTIMISATION_LEVEL)
     if "NUMBA_CACHE_DIR" in os.environ:
         return
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = base / "landing" / "kernels" / fingerprint(Path(__file__).parent)
+    version = fingerprint(Path(__file__).parent)
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))  # noqa: PTH111
+    temporary = Path(os.environ.get("TMPDIR") or "/tmp")
+    for base in (cache / "landing" / "kernels", temporary / f"landing-kernels-{os.geteuid()}"):
+        if base.is_absolute() and _is_own_folder(base / version):
+            os.environ["NUMBA_CACHE_DIR"] = str(base / version)
+            return
+
+
+def _is_own_folder(folder: Path) -> bool:
+    """Make a folder; whether it can be written, and by nobody else: what lies there is run."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        folder.mkdir(exist_ok=True)
+        status = folder.parent.lstat()
     except OSError:
-        return
-    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+        return False
+    private = stat.S_ISDIR(status.st_mode) and not status.st_mode & stat.S_IWOTH
+    return private and status.st_uid == os.geteuid() and os.access(folder, os.W_OK | os.X_OK)
 
 
 def is_cached(kernel: Any) -> bool:

@@ -95,6 +95,20 @@ def test_a_full_disk_is_a_refusal_and_not_a_bug(capsys: pytest.CaptureFixture[st
     assert capsys.readouterr().err == "error: runs/x.h5: No space left on device\n"
 
 
+def test_a_full_disk_without_a_name_says_where_compiled_kernels_go(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "/full/kernels")
+
+    def command(_: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    assert guard.told(command, []) == ExitCode.REFUSED
+    err = capsys.readouterr().err
+    assert err.startswith("error: No space left on device; ")
+    assert "/full/kernels" in err
+
+
 def test_control_characters_of_a_file_name_do_not_reach_the_terminal(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -31,6 +31,7 @@ from landing_cli.reach.flown import flown_legs, flown_trajectory, rows_with_flig
 from landing_cli.reach.records import FacetSolutions, LandingCase, Verdict, blank_rows
 from landing_cli.reach.section import section_and_expansion
 from landing_cli.reach.stored import CaseResult, ReachRun, run_to_tree
+from landing_cli.reach.summary import summarise
 from landing_cli.results import plotting
 from landing_cli.results.identity import RunIdentity
 from landing_cli.results.store import write
@@ -79,7 +80,8 @@ def toy_run(asked: np.ndarray | None = None) -> ReachRun:
         nodes = np.zeros((0, 3))
         if asked is None:
             nodes = with_flight(case, rows, centroids[FLIGHT_FACET])
-        cases.append(CaseResult(case, name, FacetSolutions(rows, nodes), {"facets": len(rows)}))
+        solutions = FacetSolutions(rows, nodes)
+        cases.append(CaseResult(case, name, solutions, summarise(mesh, solutions)))
     return ReachRun(tuple(cases))
 
 

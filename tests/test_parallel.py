@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -59,6 +59,19 @@ def test_leaving_early_takes_less_than_two_seconds_and_leaves_no_thread_or_proce
     time.sleep(0.1)
     assert threading.active_count() <= threads
     assert not _children()
+
+
+@pytest.mark.parametrize("plan", LOCAL, ids=str)
+def test_workers_do_not_run_ahead_of_a_slow_disk(plan, tmp_path: Path):
+    """What is begun but not recorded is what a kill costs: at most two chunks a job."""
+    chunks = [[i] for i in range(40)]
+    begun, taken = tmp_path / "begun", 0
+    with closing(run_chunks(partial(toy_work.notes, begun), chunks, plan)) as answers:
+        for _ in answers:
+            time.sleep(0.05 if taken < 6 else 0)
+            assert len(begun.read_text()) - taken <= 2 * plan.jobs
+            taken += 1
+    assert taken == len(chunks)
 
 
 def test_answers_larger_than_a_pipe_come_through():
@@ -132,6 +145,13 @@ def test_ctrl_c_in_the_terminal_ends_the_parent_alone_and_silently_in_the_worker
     assert time.monotonic() - start < 2
     assert told.count(b"Traceback") == 1
     assert not [pid for pid in workers if _alive(pid)]
+
+
+def test_workers_that_never_come_up_are_given_up_with_the_reason():
+    done, lost = collect(toy_work.Unloadable(), CHUNKS, WorkPlan(2, "loky"))
+    assert not done
+    assert sorted(item for chunk in lost for item in chunk.items) == list(range(40))
+    assert all("no worker could be started" in chunk.reason and "code 3" in chunk.reason for chunk in lost)
 
 
 @pytest.mark.parametrize(
@@ -213,6 +233,92 @@ def test_a_cluster_that_does_not_answer_is_refused_with_the_command_that_starts_
     monkeypatch.setattr(cluster, "CONNECT_TIMEOUT_S", 0.5)
     with pytest.raises(InputRefused, match="dask scheduler"):
         next(run_chunks(toy_work.squares, CHUNKS, WorkPlan(1, "dask", "tcp://127.0.0.1:9")))
+
+
+@pytest.fixture
+def lone_scheduler(tmp_path: Path) -> Iterator[str]:
+    """Start a scheduler without workers on loopback."""
+    pytest.importorskip("distributed")
+    port, quiet = "38788", {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", port]
+    process = subprocess.Popen([*command, "--no-dashboard"], **quiet)
+    yield f"tcp://127.0.0.1:{port}"
+    process.kill()
+    process.wait()
+
+
+STRANGE_WORKERS = {
+    # what runs before anything in the worker's interpreter; the words of the refusal
+    "lacks a package": (
+        "import sys\n"
+        "class Absent:\n"
+        "    def find_spec(self, name, path, target=None):\n"
+        "        if name.split('.')[0] == 'landing_cli':\n"
+        "            raise ModuleNotFoundError(f'No module named {name!r}')\n"
+        "sys.meta_path.insert(0, Absent())\n",
+        r"worker tcp://.* lacks a package|worker tcp://.* failed a first task",
+    ),
+    "has another version": (
+        "import landing_cli\nlanding_cli.__version__ = '0.0.9'\n",
+        r"worker tcp://.* has landing 0\.0\.9 \(here ",
+    ),
+}
+
+
+def test_a_cluster_without_workers_is_refused_with_the_command_that_starts_one(lone_scheduler: str):
+    with pytest.raises(InputRefused, match="no worker; start some with `dask worker tcp"):
+        list(run_chunks(toy_work.squares, CHUNKS, WorkPlan(1, "dask", lone_scheduler)))
+
+
+@pytest.mark.parametrize("fault", STRANGE_WORKERS)
+def test_a_worker_that_cannot_do_the_work_is_named_with_what_to_install(
+    lone_scheduler: str, tmp_path: Path, fault: str
+):
+    (tmp_path / "sitecustomize.py").write_text(STRANGE_WORKERS[fault][0])
+    with _worker(lone_scheduler, tmp_path):
+        with pytest.raises(InputRefused, match=STRANGE_WORKERS[fault][1]) as caught:
+            list(run_chunks(toy_work.squares, CHUNKS, WorkPlan(1, "dask", lone_scheduler)))
+        assert 'pip install "landing[cluster]==' in caught.value.fix
+
+
+def test_a_worker_that_does_not_answer_is_named_in_time(lone_scheduler: str, tmp_path: Path, monkeypatch):
+    from landing_cli.parallel import cluster
+
+    monkeypatch.setattr(cluster, "PREFLIGHT_TIMEOUT_S", 1.0)
+    with _worker(lone_scheduler, tmp_path) as worker:
+        worker.send_signal(signal.SIGSTOP)
+        began = time.monotonic()
+        with pytest.raises(InputRefused, match=r"worker tcp://.* failed a first task: .*imeout"):
+            list(run_chunks(toy_work.squares, CHUNKS, WorkPlan(1, "dask", lone_scheduler)))
+        assert time.monotonic() - began < 10.0
+
+
+@contextmanager
+def _worker(scheduler: str, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """Start a Dask worker, without a nanny, whose interpreter begins with the folder's sitecustomize."""
+    from distributed import Client
+
+    path = os.pathsep.join([str(folder), _environment()["PYTHONPATH"]])
+    command = [
+        sys.executable,
+        "-m",
+        "distributed.cli.dask_worker",
+        scheduler,
+        "--nthreads",
+        "1",
+        "--no-nanny",
+    ]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
+    process = subprocess.Popen(
+        [*command, "--no-dashboard"], env={**_environment(), "PYTHONPATH": path}, **quiet
+    )
+    try:
+        with Client(scheduler, timeout=20, set_as_default=False) as client:
+            client.wait_for_workers(1, timeout=30)
+        yield process
+    finally:
+        process.kill()
+        process.wait()
 
 
 def test_a_missing_extra_is_named(monkeypatch):

@@ -22,6 +22,7 @@ from landing_cli.errors import InputRefused, OutputRefused
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.reach.records import FacetSolutions, LandingCase, Verdict, blank_rows
 from landing_cli.reach.stored import CaseResult, ReachRun, run_from_result, run_to_tree
+from landing_cli.reach.summary import summarise
 from landing_cli.results.identity import RunIdentity
 from landing_cli.results.output import OutputState, finish_output, inspect_output, journal_path, open_output
 from landing_cli.results.store import read, write
@@ -37,7 +38,7 @@ def make_run(facets: int = 12, seed: int = 0) -> ReachRun:
     rng = np.random.default_rng(seed)
     vertices = rng.normal(size=(8, 3))
     faces = np.array([[i % 8, (i + 1) % 8, (i + 2) % 8] for i in range(facets)])
-    gravity = GravityField(GravityKind.DIPOLE, np.array([4.892, 0.5, 100.0]))
+    gravity = GravityField(GravityKind.DIPOLE, np.array([2.4, 50.0, 0.0, 2.492, -50.0, 0.0]))
     body = Asteroid("cube", Mesh(vertices, faces), 4.07e-4, gravity, 4.892)
     cases = []
     for order, tof in enumerate((900.0, 700.0)):
@@ -59,11 +60,10 @@ def make_run(facets: int = 12, seed: int = 0) -> ReachRun:
             np.radians(60.0),
         )
         section = Group({"facet": Dataset(np.arange(3), "1", "facets of the section", ("point",))}, {"N": 3})
-        summary = {"facets": facets, "delta_v_m_s": {"min": 1.5, "median": None, "max": 2.5}}
+        solutions = FacetSolutions(rows, nodes)
+        summary = {**summarise(body.mesh, solutions), "delta_v_m_s": {"min": 1.5, "median": None, "max": 2.5}}
         lost = {3: "its worker process died of SIGSEGV"} if order else {}
-        cases.append(
-            CaseResult(case, "pole", FacetSolutions(rows, nodes), summary, section if order else None, lost)
-        )
+        cases.append(CaseResult(case, "pole", solutions, summary, section if order else None, lost))
     return ReachRun(tuple(cases))
 
 
@@ -315,6 +315,18 @@ def test_a_giant_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
         read(path)
 
 
+def test_gigabytes_of_something_else_are_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from landing_cli.results.store import files
+
+    path = tmp_path / "zeros.h5"
+    path.touch()
+    os.truncate(path, 3 << 30)
+    monkeypatch.setattr(files, "read_whole", lambda _: pytest.fail("was read"))
+    with pytest.raises(InputRefused, match="no HDF5"):
+        read(path)
+    assert inspect_output(path, IDENTITY).state is OutputState.FOREIGN
+
+
 def test_a_result_of_another_mission_is_not_taken_for_a_reach_run(tmp_path: Path) -> None:
     path = tmp_path / "plan.h5"
     write(path, Group(), {**ROOT, "mission": "plan"}, {})
@@ -439,9 +451,10 @@ def test_a_disk_too_full_for_the_result_keeps_the_journal_and_leaves_no_temporar
 
 
 def test_journal_and_store_cost_at_most_fifty_milliseconds_a_case(tmp_path: Path) -> None:
-    """2692 facets with 40 thrust nodes each, in chunks of 64; the process is warm."""
+    """2692 facets with 40 thrust nodes each; the least of ten, as the machine may be busy."""
     import time
 
+    from landing_cli.reach.facet_work import CHUNK_FACETS
     from landing_cli.reach.stored import solutions_to_arrays
 
     run = make_run(2692)
@@ -451,12 +464,13 @@ def test_journal_and_store_cost_at_most_fifty_milliseconds_a_case(tmp_path: Path
     solutions = FacetSolutions(rows, rng.normal(size=(2692 * 40, 3)))
     run = ReachRun((dataclasses.replace(run.cases[0], solutions=solutions),))
     spent = []
-    for attempt in range(5):
+    for attempt in range(10):
         start = time.process_time()
         journal = open_output(tmp_path / f"{attempt}.h5", IDENTITY)
         assert journal is not None
-        for i in range(0, 2692, 64):
-            part = FacetSolutions(rows[i : i + 64], solutions.thrust_nodes_n[40 * i : 40 * (i + 64)])
+        for i in range(0, 2692, CHUNK_FACETS):
+            nodes = solutions.thrust_nodes_n[40 * i : 40 * (i + CHUNK_FACETS)]
+            part = FacetSolutions(rows[i : i + CHUNK_FACETS], nodes)
             journal.append(f"{i}", solutions_to_arrays(part))
         finish_output(journal, run_to_tree(run), {}, PROVENANCE, complete=True)
         spent.append(time.process_time() - start)

@@ -1,4 +1,4 @@
-"""The short form of the torture; ``python tests/torture --kills 200`` is the long one."""
+"""The short form of the torture, on a stand-in; ``make torture`` is the long one, on the real command."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent / "torture"))
 
+from choices import choices
+from forge_results import forge_results
+from hostile_inputs import SCENARIOS, SHAPES, hostile_inputs
 from kill_runs import kill_runs
 from kill_workers import deadly_facet, kill_workers
 from programs import TOY, Reference
@@ -39,3 +42,20 @@ def test_killed_workers_cost_nothing(reference: Any, folder: Path) -> None:
 
 def test_a_facet_that_kills_its_worker_is_named_and_tried_again(reference: Any, folder: Path) -> None:
     assert not deadly_facet(reference, folder).failures
+
+
+def test_every_output_that_is_there_already_is_told_with_the_choices(reference: Any, folder: Path) -> None:
+    assert not choices(reference, folder).failures
+
+
+def test_every_hostile_scenario_and_shape_is_told_by_name_at_little_cost() -> None:
+    scenarios, shapes = hostile_inputs()
+    assert (scenarios.tried, shapes.tried) == (len(SCENARIOS), len(SHAPES))
+    assert not scenarios.failures
+    assert not shapes.failures
+
+
+def test_a_forged_result_is_refused_or_harmless(folder: Path) -> None:
+    tally = forge_results(folder, every=50)
+    assert not tally.failures
+    assert tally.tried > 20

@@ -132,8 +132,11 @@ def _message_and_code(error: Exception) -> tuple[str, int]:
     if isinstance(error, LandingError):
         return f"error: {error}", error.exit_code
     if isinstance(error, OSError) and error.errno in _REFUSED_BY_SYSTEM:
-        where = f"{error.filename}: " if error.filename else ""
-        return f"error: {where}{error.strerror}", ExitCode.REFUSED
+        if error.filename:
+            return f"error: {error.filename}: {error.strerror}", ExitCode.REFUSED
+        kernels = os.environ.get("NUMBA_CACHE_DIR", "numba's cache")
+        fix = f"if it met the compiled kernels ({kernels}), set NUMBA_CACHE_DIR to another folder"
+        return f"error: {error.strerror}; {fix}", ExitCode.REFUSED
     usage = getattr(error, "format_message", None)  # the command-line library's own errors
     if usage is not None:
         text, context = usage(), getattr(error, "ctx", None)

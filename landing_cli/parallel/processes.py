@@ -24,7 +24,7 @@ from landing_cli.parallel.worker import serve
 C = TypeVar("C")
 R = TypeVar("R")
 
-STARTS_BEFORE_GIVING_UP = 3
+STARTS_BEFORE_GIVING_UP = 10
 
 
 def run_on_processes(

@@ -27,6 +27,7 @@ from landing_cli.plan.stored_legs import (
     leg_to_group,
     make_leg,
 )
+from landing_cli.results.body_checks import check_spacecraft
 from landing_cli.results.body_group import body_from_group, body_to_group, number, vector
 from landing_cli.results.store import StoredResult
 from landing_cli.results.tree import Dataset, Group
@@ -223,6 +224,7 @@ def run_from_result(result: StoredResult) -> PlanRun:
 def _run_from_tree(tree: Group, cpu: Any) -> PlanRun:
     asteroid = body_from_group(tree.group("body"))
     craft = Spacecraft(**tree.group("spacecraft").attributes)  # type: ignore[arg-type]
+    check_spacecraft(craft)
     surface = build_surface_index(asteroid.mesh)
     groups = {name: tree.group("cases", name) for name in tree.group("cases").members}
     ordered = sorted(groups, key=lambda name: number(groups[name], "order"))

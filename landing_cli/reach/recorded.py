@@ -8,6 +8,7 @@ from contextlib import closing
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.errors import InputRefused
 from landing_cli.parallel import LostChunk, WorkPlan, run_chunks
 from landing_cli.reach.records import FacetSolutions, blank_rows, join
 from landing_cli.reach.stored import solutions_from_arrays, solutions_to_arrays
@@ -47,10 +48,19 @@ def solve_recorded(
         Of all facets, ascending; blank where a facet was lost.
     dict of int to str
         The lost facets and why. They are not recorded, so that the next run tries them again.
+
+    Raises
+    ------
+    InputRefused
+        If the journal holds what this run cannot have recorded.
     """
     tell = progress or (lambda facets: None)
     parts = [solutions_from_arrays(a) for key, a in journal.records.items() if key.startswith(f"{stage}/")]
     known = np.concatenate([part.rows["facet"] for part in parts]) if parts else np.zeros(0, np.int64)
+    asked = np.concatenate(chunks) if len(chunks) else known
+    if len(np.unique(known)) != len(known) or not np.isin(known, asked).all():
+        told = "holds facets that this run never asks for, or one of them twice"
+        raise InputRefused(told, where=str(journal.path), fix="start over with --force")
     tell(len(known))
     left = [chunk[~np.isin(chunk, known)] for chunk in chunks]
     lost: dict[int, str] = {}

@@ -13,6 +13,8 @@ from landing_cli.body.asteroid import Asteroid
 from landing_cli.errors import InputRefused
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.reach.records import FACET_COLUMNS, FACET_DTYPE, FacetSolutions, LandingCase
+from landing_cli.reach.stored_checks import check_case
+from landing_cli.results.body_checks import check_spacecraft
 from landing_cli.results.body_group import body_from_group, body_to_group, number, vector
 from landing_cli.results.store import StoredResult
 from landing_cli.results.tree import (
@@ -117,6 +119,8 @@ def solutions_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> FacetSolutions:
     rows, nodes = arrays.get("rows"), arrays.get("thrust_nodes_n")
     if rows is None or nodes is None or rows.dtype != FACET_DTYPE or nodes.dtype != np.float64:
         raise _unfit("a journal record holds other columns than this version writes")
+    if (rows["thrust_nodes"] < 0).any():
+        raise _unfit("a journal record holds a negative number of thrust nodes")
     if rows.ndim != 1 or nodes.shape != (rows["thrust_nodes"].sum(dtype=np.int64), 3):
         raise _unfit("a journal record's thrust nodes do not fit its rows")
     return FacetSolutions(rows, nodes)
@@ -163,25 +167,28 @@ def run_from_result(result: StoredResult) -> ReachRun:
     Raises
     ------
     InputRefused
-        If the file is of another mission, or lacks a part.
+        If the file is of another mission, lacks a part, or holds what no run can have found.
     """
     if result.mission != MISSION:
         told = f"holds a result of '{result.mission}', not of '{MISSION}'"
         raise InputRefused(told, where=str(result.path), fix="name a file that `reach run` wrote")
     try:
         return _run_from_tree(result.tree)
-    except (KeyError, ValueError, TypeError, IndexError) as error:
+    except (KeyError, ValueError, TypeError, IndexError, OverflowError) as error:
         raise _unfit(f"lacks a part or holds a wrong one: {error}", str(result.path)) from error
 
 
 def _run_from_tree(tree: Group) -> ReachRun:
     asteroid = body_from_group(tree.group("body"))
     craft = Spacecraft(**tree.group("spacecraft").attributes)  # type: ignore[arg-type]
+    check_spacecraft(craft)
     groups = {name: tree.group("cases", name) for name in tree.group("cases").members}
     ordered = sorted(groups, key=lambda name: number(groups[name], "order"))
     cases = tuple(_case_from_group(name, groups[name], asteroid, craft) for name in ordered)
     if not cases:
         raise ValueError("no case")
+    for case in cases:
+        check_case(case)
     return ReachRun(cases)
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.mesh import Mesh
+from landing_cli.results.body_checks import check_asteroid
 from landing_cli.results.tree import Dataset, Group
 
 
@@ -57,21 +58,19 @@ def body_from_group(group: Group) -> Asteroid:
     KeyError
         If a part is missing.
     ValueError
-        If the mesh is none.
+        If the mesh is none, or a number absurd.
     """
     mesh = Mesh(group.dataset("vertices").data, group.dataset("faces").data)
-    if mesh.vertices.shape[1:] != (3,) or mesh.faces.shape[1:] != (3,):
-        raise ValueError("the body's mesh is no list of triangles")
-    if mesh.faces.size and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
-        raise ValueError("a facet refers to a vertex that does not exist")
     kind = GravityKind[str(group.attributes["gravity"]).upper()]
-    return Asteroid(
+    asteroid = Asteroid(
         str(group.attributes["name"]),
         mesh,
         number(group, "rotation_rate_rad_s"),
         GravityField(kind, group.dataset("gravity_params").data),
         number(group, "gm_m3_s2"),
     )
+    check_asteroid(asteroid)
+    return asteroid
 
 
 def number(group: Group, name: str) -> float:

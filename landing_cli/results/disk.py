@@ -143,6 +143,25 @@ def read_whole(path: Path) -> bytes:
         return file.readall()
 
 
+def begins_with(path: Path, signature: bytes) -> bool:
+    """Look at the first bytes of a regular file of sensible size, and at nothing more.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    signature : bytes
+        What it should begin with.
+
+    Raises
+    ------
+    InputRefused
+        As ``read_whole``.
+    """
+    with open_regular(path, LARGEST_FILE_BYTES) as file:
+        return file.read(len(signature)) == signature
+
+
 def lock_file(path: Path) -> int:
     """Open a file, made if need be, and hold the only lock on it until it is closed.
 

@@ -34,7 +34,7 @@ HEADER_KEY = "header"
 _PREFIX = struct.Struct("<4sIQ")
 _MARKER = b"RCRD"
 _HEAD_LENGTH = struct.Struct("<I")
-_NONSENSE = (ValueError, KeyError, TypeError, AttributeError, RecursionError, struct.error)
+_NONSENSE = (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError, struct.error)
 
 
 class NotAJournal(InputRefused):

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from programs import Ended, Reference, Tally, environment, finish, trace_of
+from programs import Ended, Reference, Tally, environment, finish
 
 SHARES = (0.0, 0.001, 0.05, 0.3, 0.6, 0.9, 0.99)
 
@@ -35,10 +35,7 @@ def _file_limits(reference: Reference, folder: Path, size: int) -> Tally:
         for backend in ("threads", "loky"):
             output = folder / f"limit-{share}-{backend}" / "run.h5"
             limit = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (int(share * size),) * 2)
-            command = [*reference.program.command(output, backend)]
-            if reference.program.traces:  # the trace would hit the limit too
-                del command[command.index("--trace") : command.index("--trace") + 2]
-            ended = finish(command, preexec_fn=limit)
+            ended = finish(reference.program.command(output, backend), preexec_fn=limit)
             complaints = refused(ended) or _leftovers(output)
             tally.record(
                 f"{backend}, {share} of the result", complaints or reference.resumed(output, backend)
@@ -54,10 +51,7 @@ def _full_disks(reference: Reference, folder: Path, size: int) -> Tally:
             if place is None:
                 break
             output = place / "run.h5"
-            command = reference.program.command(output)
-            if reference.program.traces:
-                command[command.index("--trace") + 1] = str(folder / "trace-elsewhere.txt")
-            ended = finish(command)
+            ended = finish(reference.program.command(output))
             complaints = refused(ended) or _leftovers(output)
             if not complaints:
                 subprocess.run(["mount", "-o", "remount,size=100m", place], check=True)
@@ -78,10 +72,7 @@ def _bad_places(reference: Reference, folder: Path) -> Tally:
     places = [a_file / "run.h5", fifo, folder, a_file, Path("/proc/run.h5"), Path("/dev/full")]
     places += [folder / ("x" * 300), *([] if os.geteuid() == 0 else [sealed / "run.h5"])]
     for place in places:
-        ended = finish(
-            [w for w in reference.program.command(place) if w != "--trace" and "trace.txt" not in w]
-        )
-        tally.record(str(place)[-60:], refused(ended))
+        tally.record(str(place)[-60:], refused(finish(reference.program.command(place))))
     with _mounted(folder / "read-only", "ro") as mounted:
         if mounted is not None:
             tally.record("read-only disk", refused(finish(reference.program.command(mounted / "run.h5"))))
@@ -91,13 +82,17 @@ def _bad_places(reference: Reference, folder: Path) -> Tally:
 
 
 def _stdouts(reference: Reference, folder: Path) -> Tally:
-    tally = Tally(f"{reference.program.name}: stdout closed or full")
+    tally = Tally(f"{reference.program.name}: streams closed or full")
     for name, redirect, expected in [
         ("closed", ">&-", 0),
         ("pipe whose reader has gone", "| head -c 0", 0),
+        ("pipe to head -1", "| head -1", 0),
         ("full device", "> /dev/full", 3),
+        ("stderr closed", "2>&-", 0),
+        ("stderr full", "2> /dev/full", 0),
+        ("all closed", "<&- >&- 2>&-", 0),
     ]:
-        output = folder / f"stdout-{expected}-{len(name)}" / "run.h5"
+        output = folder / f"stream-{name.replace(' ', '-')}" / "run.h5"
         line = '"$@" ' + redirect + "; exit ${PIPESTATUS[0]}"
         ended = finish(["bash", "-c", line, "bash", *reference.program.command(output)])
         complaints = [] if ended.code == expected else [f"exit code {ended.code}: {ended.stderr[-200:]}"]
@@ -117,7 +112,10 @@ def _second_run(reference: Reference, folder: Path) -> Tally:
     first.send_signal(signal.SIGSTOP)  # it must still be at work, however fast it is
     for choice in ([], ["--resume"], ["--force"]):
         ended = finish([*command, *choice])
-        tally.record(f"second with {choice}", refused(ended))
+        complaints = refused(ended)
+        if ended.seconds > reference.seconds["threads"] + 2.0:
+            complaints.append(f"waited {ended.seconds:.1f} s")
+        tally.record(f"second with {choice}", complaints)
     first.send_signal(signal.SIGCONT)
     complaints = [] if first.wait() == 0 else [f"the first ended with {first.returncode}"]
     tally.record("the first is not disturbed", complaints or reference.resumed(output))
@@ -134,7 +132,7 @@ def refused(ended: Ended) -> list[str]:
 
 
 def _leftovers(output: Path) -> list[str]:
-    known = {output.name, f"{output.name}.journal", trace_of(output).name}
+    known = {output.name, f"{output.name}.journal"}
     left = {p.name for p in output.parent.iterdir()} - known if output.parent.exists() else set()
     return [f"left behind: {sorted(left)}"] if left else []
 

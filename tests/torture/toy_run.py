@@ -1,13 +1,11 @@
 """A run like ``reach run`` with a made-up solver: the same dispatch, journal, store, signals and exit codes.
 
-``toy_run.py -o PATH [--resume] [--force] [--jobs N] [--backend B] [--trace FILE] [--deadly FACET]``
+``toy_run.py -o PATH [--resume] [--force] [--jobs N] [--backend B] [--name NAME]``
 """
 
 from __future__ import annotations
 
 import argparse
-import os
-import signal
 import time
 from collections.abc import Sequence
 from functools import partial
@@ -20,26 +18,23 @@ CASES = ("pole_700s", "pole_900s")
 FACETS = 320
 
 
-def solve(trace: Path | None, deadly: int | None, seed: int, facets):  # type: ignore[no-untyped-def]
-    """Make up an answer from the facet's number alone; the trace says which chunks were solved."""
+def solve(seed: int, facets):  # type: ignore[no-untyped-def]
+    """Make up an answer from the facet's number alone."""
     import numpy as np
+    from programs import die_on, note_chunk
 
     from landing_cli.reach.records import FacetSolutions, Verdict, blank_rows
 
+    note_chunk(f"{CASES[seed]}/{facets[0]}")
+    die_on(facets + seed * FACETS)
     rows, nodes = blank_rows(facets), []
     for row, facet in zip(rows, facets.tolist(), strict=True):
-        if facet == deadly:
-            os.kill(os.getpid(), signal.SIGKILL)
         rng = np.random.default_rng((seed, facet))
         row["verdict"] = rng.choice(list(Verdict)[1:])
         row["performance_index_m2_s3"] = rng.normal()
         row["thrust_nodes"] = rng.integers(0, 41)
         nodes.append(rng.normal(size=(row["thrust_nodes"], 3)))
         time.sleep(0.002)
-    if trace is not None:
-        descriptor = os.open(trace, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-        os.write(descriptor, f"{seed}/{facets[0]}\n".encode())
-        os.close(descriptor)
     return FacetSolutions(rows, np.concatenate(nodes))
 
 
@@ -54,13 +49,14 @@ def run(arguments: Sequence[str]) -> int:
     from landing_cli.errors import PartialResult
     from landing_cli.reach.recorded import solve_recorded
     from landing_cli.reach.stored import CaseResult, ReachRun, run_to_tree
+    from landing_cli.reach.summary import summarise
     from landing_cli.results.identity import RunIdentity
     from landing_cli.results.output import finish_output, open_output
     from landing_cli.results.provenance import Stopwatch
 
     watch = Stopwatch()
     identity = RunIdentity(
-        "toy run", f"name: toy\nfacets: {FACETS}\n", "0" * 64, "1", chunk_facets=CHUNK_FACETS
+        "toy run", f"name: {choices.name}\nfacets: {FACETS}\n", "0" * 64, "1", chunk_facets=CHUNK_FACETS
     )
     guard.hint_on_interrupt("continue with --resume")
     journal = open_output(choices.output, identity, resume=choices.resume, force=choices.force)
@@ -72,9 +68,10 @@ def run(arguments: Sequence[str]) -> int:
     with journal:
         cases = []
         for seed, (name, case) in enumerate(zip(CASES, _cases(), strict=True)):
-            work = partial(solve, choices.trace, choices.deadly if seed else None, seed)
+            work = partial(solve, seed)
             solutions, lost = solve_recorded(journal, name, chunks, work, plan)
-            cases.append(CaseResult(case, "pole", solutions, {"facets": FACETS}, lost=lost))
+            summary = summarise(case.asteroid.mesh, solutions)
+            cases.append(CaseResult(case, "pole", solutions, summary, lost=lost))
         result = ReachRun(tuple(cases))
         finish_output(journal, run_to_tree(result), {}, watch.provenance(), complete=not result.lost_facets)
     print(f"wrote {choices.output}")
@@ -91,8 +88,7 @@ def _choices(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--backend", default="threads")
     parser.add_argument("--scheduler")
-    parser.add_argument("--trace", type=Path)
-    parser.add_argument("--deadly", type=int)
+    parser.add_argument("--name", default="toy")
     return parser.parse_args(arguments)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from landing_cli.errors import InputRefused
-from landing_cli.results.disk import read_whole, replace_file
+from landing_cli.results.disk import begins_with, read_whole, replace_file
 from landing_cli.results.identity import SCHEMA_VERSION, RunIdentity
 from landing_cli.results.tree import Attribute, Group, digest
 
@@ -115,6 +115,8 @@ def read(path: Path) -> StoredResult:
     """
     from landing_cli.results.store.parse import Distrusted, parse_image
 
+    if not begins_with(path, HDF5_SIGNATURE):  # gigabytes of something else are not worth reading
+        raise _refused(path, "is no HDF5 file")
     image = _unsealed(path, read_whole(path))
     try:
         root = parse_image(image)
@@ -143,8 +145,7 @@ def is_result(path: Path) -> bool:
     path : Path
         The file.
     """
-    data = read_whole(path)
-    return data.startswith(HDF5_SIGNATURE) and _SEAL_TEXT in data[-2 * _SEAL_BYTES :]
+    return begins_with(path, HDF5_SIGNATURE) and _SEAL_TEXT in read_whole(path)[-2 * _SEAL_BYTES :]
 
 
 def _seal(image: bytes | memoryview) -> bytes:
@@ -152,8 +153,6 @@ def _seal(image: bytes | memoryview) -> bytes:
 
 
 def _unsealed(path: Path, data: bytes) -> bytes:
-    if not data.startswith(HDF5_SIGNATURE):
-        raise _refused(path, "is no HDF5 file")
     image, seal = data[:-_SEAL_BYTES], data[-_SEAL_BYTES:]
     if not seal.startswith(_SEAL_TEXT):
         raise _refused(path, "has no seal at its end: cut short, or written by another program")

@@ -1,0 +1,134 @@
+"""Whether a stored run can be true: what compiled code and printers take for granted, asked of every file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import pi
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from landing_cli.reach.records import FACET_COLUMNS, FacetSolutions, LandingCase
+from landing_cli.reach.summary import summarise
+from landing_cli.results.body_checks import bounded, positive
+from landing_cli.results.tree import Dataset, Group
+
+if TYPE_CHECKING:
+    from landing_cli.reach.stored import CaseResult
+
+# what a scenario may ask for at most, or an answer to one may be
+_LARGEST = {
+    "tof_s": 1e7,
+    "final_stage_s": 1e7,
+    "position_m": 1e9,
+    "velocity_m_s": 1e6,
+    "ellipsoid_m": 1e9,
+    "handover_position_m": 1e9,
+    "handover_velocity_m_s": 1e6,
+    "costates": 1e12,
+    "thrust_nodes_n": 1e7,
+}
+_CHOICES = {n: get_args(h) for n, h in get_type_hints(LandingCase).items() if get_origin(h) is Literal}
+
+
+def check_case(result: CaseResult) -> None:
+    """Hold a case to what can have been asked and answered.
+
+    Parameters
+    ----------
+    result : CaseResult
+        As it was read.
+
+    Raises
+    ------
+    ValueError
+        If a quantity is impossible, a choice unknown, or a facet not of this body.
+    """
+    case, facets = result.case, len(result.case.asteroid.mesh.faces)
+    for name in ("tof_s", "final_stage_s", "ellipsoid_m"):
+        positive(name, getattr(case, name), _LARGEST[name])
+    if not case.descent_s > 0.0:
+        raise ValueError("final_stage_s is longer than tof_s")
+    if not 0.0 < case.glide_slope_half_angle_rad <= pi / 2:
+        raise ValueError("glide_slope_half_angle_rad is not between 0 and pi/2")
+    for name in ("position_m", "velocity_m_s"):
+        bounded(name, getattr(case, name), _LARGEST[name])
+    for name, allowed in _CHOICES.items():
+        if getattr(case, name) not in allowed:
+            raise ValueError(f"{name} is none of {', '.join(allowed)}")
+    check_rows(result.solutions, facets)
+    _all_within("lost", np.array(list(result.lost), dtype=np.int64), facets)
+    if result.boundary is not None:
+        _check_boundary(result.boundary, facets)
+    _check_printable("summary", result.summary)
+    _check_summary(result.summary, summarise(case.asteroid.mesh, result.solutions))
+
+
+def check_rows(solutions: FacetSolutions, facets: int) -> None:
+    """Hold rows to facets that exist, each once, ascending, and to enumerations that are known.
+
+    Parameters
+    ----------
+    solutions : FacetSolutions
+        Rows whose types have been checked.
+    facets : int
+        How many there are.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+    rows = solutions.rows
+    _all_within("facet", rows["facet"], facets)
+    if (np.diff(rows["facet"].astype(np.int64)) <= 0).any():
+        raise ValueError("the facets do not ascend")
+    if (rows["thrust_nodes"] < 0).any():
+        raise ValueError("a facet has a negative number of thrust nodes")
+    bounded("thrust_nodes_n", solutions.thrust_nodes_n, _LARGEST["thrust_nodes_n"])
+    for column in FACET_COLUMNS:
+        if column.name in _LARGEST:
+            values = np.nan_to_num(rows[column.name], nan=0.0, posinf=np.inf, neginf=-np.inf)
+            bounded(column.name, values, _LARGEST[column.name])
+        if column.flags is not None and not np.isin(rows[column.name], list(column.flags)).all():
+            raise ValueError(f"{column.name} holds a value without a meaning")
+
+
+def _check_boundary(boundary: Group, facets: int) -> None:
+    """Lists of facets, or one number a facet."""
+    for name, member in boundary.members.items():
+        if not isinstance(member, Dataset) or member.data.ndim != 1:
+            raise ValueError(f"boundary/{name} is no list")
+        if name == "domain" and len(member.data) != facets:
+            raise ValueError("the domain does not tell of every facet")
+        if member.data.dtype.kind in "iu":
+            _all_within(f"boundary/{name}", member.data, facets)
+
+
+def _check_summary(stored: Mapping[str, Any], known: Mapping[str, Any], path: str = "summary") -> None:
+    """Every number that is printed is there, and is a number."""
+    for name, value in known.items():
+        if name not in stored:
+            raise ValueError(f"{path} lacks {name}")
+        found = stored[name]
+        if isinstance(value, Mapping):
+            if not isinstance(found, Mapping):
+                raise ValueError(f"{path}/{name} is no group")
+            _check_summary(found, value, f"{path}/{name}")
+        elif not (found is None or isinstance(found, int | float)):
+            raise ValueError(f"{path}/{name} is no number")
+
+
+def _check_printable(path: str, values: Mapping[str, Any]) -> None:
+    """Nothing but numbers, words and groups of them."""
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            _check_printable(f"{path}/{name}", value)
+        elif not (value is None or isinstance(value, int | float | str)):
+            raise ValueError(f"{path}/{name} is neither number nor word")
+
+
+def _all_within(name: str, indices: NDArray[Any], count: int) -> None:
+    if indices.dtype.kind not in "iu" or (indices.size and not 0 <= indices.min() <= indices.max() < count):
+        raise ValueError(f"{name} names what does not exist")
