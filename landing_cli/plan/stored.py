@@ -217,7 +217,7 @@ def run_from_result(result: StoredResult) -> PlanRun:
         raise InputRefused(told, where=str(result.path), fix="name a file that `plan` wrote")
     try:
         return _run_from_tree(result.tree, result.provenance.get(CPU_ATTRIBUTE))
-    except (KeyError, ValueError, TypeError, IndexError) as error:
+    except (KeyError, ValueError, TypeError, IndexError, OverflowError) as error:
         raise _unfit(f"lacks a part or holds a wrong one: {error}", str(result.path)) from error
 
 
