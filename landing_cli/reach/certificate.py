@@ -202,10 +202,9 @@ def linearised_thrust_level(
     work = by_thrust = 0.0
     for r in range(plan.n_rows):
         value = model.row_value[r]
-        for a in range(7):
+        for a in range(1, 7):
             value -= model.row_y[r, a] * point.y[a]
         work += point.multiplier[r] * value
-        by_thrust -= point.multiplier[r] * model.row_y[r, 0]
     for k in range(point.thrust.shape[0]):
         pull, F = model.row_pull[k], point.thrust[k]
         work -= pull[0] * F[0] + pull[1] * F[1] + pull[2] * F[2]

@@ -291,9 +291,7 @@ def _refresh_approach(case: ScaledCase, target: Floats, model: Model, y: Floats,
 
 
 @kernel
-def _refresh_cuts(
-    case: ScaledCase, path: Path, model: Model, cuts: Cuts, plan: Layout, retake: float
-) -> None:
+def _refresh_cuts(case: ScaledCase, path: Path, model: Model, cuts: Cuts, plan: Layout, retake: bool) -> None:
     """Rows of the tangent planes; ``retake`` moves each to the current position of its node."""
     for c in range(plan.n_cuts):
         k, n, r = cuts.node[c], cuts.normal[c], plan.n_equal + c
@@ -310,11 +308,7 @@ def _refresh_cuts(
 def _refresh_propellant(
     case: ScaledCase, point: Point, path: Path, model: Model, r: int, touchdown_mass: float
 ) -> None:
-    """Row r: propellant left, tau P - (1 - m_touchdown) >= 0, with an isotropic bound of its curvature.
-
-    The level tau scales what is granted, propellant like thrust, so that a least level exists for every
-    facet and is at most 1 exactly for those that can be reached.
-    """
+    """Row r: propellant left, P - (1 - m_touchdown) >= 0, with an isotropic bound of its curvature."""
     n = path.gradient.shape[0]
     h, flow = 1.0 / n, case.mass_flow
     rounded = 0.0  # what the rounded cones of thrust burn more than the flight
@@ -328,9 +322,8 @@ def _refresh_propellant(
         for i in range(3):
             model.row_thrust[r, k, i] = -flow * h * F[i] / norm
         model.thrust_curvature[k] += eta * flow * h / norm
-    model.row_value[r] = point.y[0] * case.propellant - (1.0 - touchdown_mass) - rounded
+    model.row_value[r] = case.propellant - (1.0 - touchdown_mass) - rounded
     model.row_y[r, :] = 0.0
-    model.row_y[r, 0] = case.propellant
     fractions = case.arc_fractions
     last = fractions.shape[0] - 1
     for j in range(last + 1):
@@ -377,15 +370,14 @@ def refresh(
     target: Floats,
     plan: Layout,
     cuts: Cuts,
-    iteration: int,
-    retake_from: int,
+    retake: bool,
     point: Point,
     path: Path,
     model: Model,
 ) -> tuple[float, float]:
     """Linearise the whole problem at ``point``: fly it, and fill every row, cone and gradient.
 
-    The tangent planes follow the path from iteration ``retake_from`` on.
+    Where ``retake``, the tangent planes are moved to the path.
 
     Returns
     -------
@@ -417,7 +409,7 @@ def refresh(
     if case.on_ellipsoid:
         _refresh_handover_on_ellipsoid(case, target, model, point)
         _refresh_approach(case, target, model, y, plan.n_equal + plan.n_cuts)
-    _refresh_cuts(case, path, model, cuts, plan, iteration >= retake_from)
+    _refresh_cuts(case, path, model, cuts, plan, retake)
     if case.propellant < 1.0:
         _refresh_propellant(case, point, path, model, plan.n_rows - 1, touchdown_mass)
     fill_row_pull(point, model, plan.n_rows)

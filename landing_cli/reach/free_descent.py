@@ -20,7 +20,7 @@ from landing_cli.body.bvh import SurfaceIndex, build_surface_index
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.reach.certificate import GravityBounds, gravity_bounds, gravity_tube
 from landing_cli.reach.delivery import VALUE_COLUMNS, Deliveries, Frame, deliver_many, new_deliveries
-from landing_cli.reach.free_batch import PROPELLANT, THRUST, Batch
+from landing_cli.reach.free_batch import Batch
 from landing_cli.reach.free_flights import Question, best_flights, flights_near
 from landing_cli.reach.free_solve import CERTIFIED, CONVERGED, STALLED
 from landing_cli.reach.records import Binding, FacetSolutions, LandingCase, Verdict, blank_rows
@@ -120,7 +120,7 @@ def _new_work(prepared: PreparedCase, scaled: ScaledCase, tube: Floats, facets: 
     shared = prepared.shared
     targets, normals = shared.centroids_m[facets] / scaled.length_m, shared.normals[facets]
     arc_bound = shared.bounds.on_arcs_m_s2 / scaled.acceleration_m_s2
-    question = Question(scaled, targets, normals, False, tube, arc_bound)
+    question = Question(scaled._replace(propellant=2.0), targets, normals, False, tube, arc_bound)
     return Work(question, blank_rows(facets), np.zeros((len(facets), len(scaled.mid_cos), 3)))
 
 
@@ -174,9 +174,8 @@ def _by_margin(prepared: PreparedCase, work: Work, chosen: Ints) -> None:
     rows["proved"][chosen[short]] = flights.bound[short] > 1.0
     rows["violation"][chosen[short]] = flights.level[short] - 1.0
     by_ellipsoid = short & (around | (rows["binding"][chosen] == Binding.ELLIPSOID)) & (flights.bound <= 1.0)
-    scarce = flights.pressure[:, PROPELLANT] > flights.pressure[:, THRUST]
-    rows["binding"][chosen[short]] = np.where(scarce[short], Binding.PROPELLANT, Binding.THRUST)
-    rows["binding"][chosen[by_ellipsoid & ~scarce]] = Binding.ELLIPSOID
+    rows["binding"][chosen[short]] = Binding.THRUST
+    rows["binding"][chosen[by_ellipsoid]] = Binding.ELLIPSOID
     flights.status[short] = STALLED
     _deliver(prepared, work, chosen, flights)
     _less_energy(prepared, work, chosen, flights)
@@ -203,8 +202,26 @@ def _on_coarse_grid(prepared: PreparedCase, facets: Ints) -> Work:
     """Judge facets on the coarse grid: by energy, and by margin what that leaves open."""
     work = _new_work(prepared, prepared.coarse, prepared.coarse_tube, facets)
     _by_energy(prepared, work, np.arange(len(facets)))
-    _by_margin(prepared, work, np.flatnonzero(work.rows["verdict"] == Verdict.UNRESOLVED))
+    scarce = _within_propellant(prepared, work)
+    _by_margin(prepared, work, np.flatnonzero((work.rows["verdict"] == Verdict.UNRESOLVED) & ~scarce))
     return work
+
+
+def _within_propellant(prepared: PreparedCase, work: Work) -> Flags:
+    """Ask again, with the bound, where the least-energy flight burns more propellant than there is.
+
+    Returns where that was asked. No least thrust level tells whether the propellant suffices: where no
+    flight within it is found, the facet stays unresolved, and says so.
+    """
+    rows, unbounded = work.rows, work.question.case
+    scarce = (rows["verdict"] == Verdict.UNRESOLVED) & (rows["fuel_kg"] > prepared.frame.propellant_kg)
+    chosen = np.flatnonzero(scarce)
+    if len(chosen):
+        bound = prepared.frame.propellant_kg / prepared.frame.mass_kg
+        bounded = work.question._replace(case=unbounded._replace(propellant=bound))
+        _by_energy(prepared, work._replace(question=bounded), chosen)
+        rows["binding"][chosen[rows["verdict"][chosen] == Verdict.UNRESOLVED]] = Binding.PROPELLANT
+    return np.asarray(scarce)
 
 
 def _on_fine_grid(prepared: PreparedCase, facets: Ints) -> Work:
@@ -213,6 +230,7 @@ def _on_fine_grid(prepared: PreparedCase, facets: Ints) -> Work:
     everything = np.arange(len(facets))
     _by_margin(prepared, work, everything)
     _by_energy(prepared, work, everything[work.rows["verdict"] != Verdict.UNREACHABLE])
+    _within_propellant(prepared, work)
     return work
 
 
@@ -278,7 +296,8 @@ def _doubtful(rows: NDArray[np.void]) -> Ints:
     """Rows that a finer time grid may decide otherwise."""
     near = (rows["verdict"] == Verdict.UNREACHABLE) & (rows["proved"] == 0)
     near &= (rows["violation"] < DOUBTFUL_LEVEL - 1.0) & (rows["binding"] != Binding.TERRAIN)
-    return np.flatnonzero(near | (rows["verdict"] == Verdict.UNRESOLVED))
+    open_ = (rows["verdict"] == Verdict.UNRESOLVED) & (rows["binding"] != Binding.PROPELLANT)
+    return np.flatnonzero(near | open_)
 
 
 def solve_prepared(prepared: PreparedCase, facets: NDArray[np.integer]) -> FacetSolutions:

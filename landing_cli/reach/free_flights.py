@@ -24,8 +24,6 @@ Flags = NDArray[np.bool_]
 
 NEVER = 1 << 30
 FREE_LIMIT, CUT_LIMIT = 40, 36
-# The propellant's curvature is a bound, not exact: convergence is linear there.
-SCARCE_FACTOR = 4
 RETAKE_FROM = 5
 ENERGY_ONLY, MARGIN_WEIGHT = 1.0, 1e-3
 TOUCH = 1.0 - 1e-6
@@ -172,8 +170,6 @@ def _solve_again(
 def _solve(question: Question, cuts: CutBatch, level: Floats, retake_from: int, limit: int) -> Batch:
     """Run the kernel on a whole batch."""
     out = new_batch(len(question.targets), len(question.case.mid_cos))
-    if question.case.propellant < 1.0:
-        limit *= SCARCE_FACTOR
     solve_many(
         question.case,
         question.targets,

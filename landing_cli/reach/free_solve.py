@@ -133,7 +133,8 @@ def cold_start(case: ScaledCase, target: Floats, normal: Floats, plan: Layout, s
     for r in range(plan.n_equal, plan.n_rows):
         point.slack[r] = 0.05
         point.multiplier[r] = -0.05 * scale
-    refresh(case, target, plan, solver.cuts, 0, 1, point, solver.path, model)
+    retake = plan.n_cuts < 0  # never: they were just given
+    refresh(case, target, plan, solver.cuts, retake, point, solver.path, model)
     for j in range(plan.n_cones):
         s, norm2 = point.cone_slack[j], 0.0
         for i in range(4):
@@ -191,9 +192,8 @@ def solve(
         iteration += 1
         if iteration > 1 and iteration % DEFECT_PERIOD == FIRST_DEFECT:
             measure_defect(case, point.thrust, path)
-        energy, mass_costate = refresh(
-            case, target, plan, solver.cuts, iteration, retake_from, point, path, model
-        )
+        retake = iteration >= retake_from
+        energy, mass_costate = refresh(case, target, plan, solver.cuts, retake, point, path, model)
         primal, dual, gap = residuals(
             point, model, step, plan.n_equal, plan.n_rows, plan.n_cones, plan.tau_free
         )

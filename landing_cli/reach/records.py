@@ -110,7 +110,7 @@ FACET_COLUMNS: tuple[Column, ...] = (
         "thrust_margin",
         "f8",
         "1",
-        "1 - least share of thrust, and of bounded propellant, that suffices",
+        "1 - least thrust level that makes the facet reachable",
     ),
     Column("iterations", "i4", "1", "solver iterations"),
     Column("handover_position_m", "f8", "m", "handover position, body frame", (3,)),

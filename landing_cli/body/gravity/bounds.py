@@ -129,11 +129,12 @@ def _bound_on_surface(
 
     Patches that may hold more than TOLERANCE above what is met are split, until none is left.
     """
-    triangles = _sphere_triangles()
+    # a writable copy, as the solvers have: the kernels compile once
+    triangles, params = _sphere_triangles(), field.params.copy()
     while True:
         directions, angles = _centres(triangles)
         sizes, ceilings, reaches = np.zeros((3, len(triangles)))
-        _fill_ceilings(int(field.kind), field.params, directions, semi_axes, angles, sizes, ceilings, reaches)
+        _fill_ceilings(int(field.kind), params, directions, semi_axes, angles, sizes, ceilings, reaches)
         points = directions * semi_axes
         attained = max(attained, sizes[region.holds(points, 0.0)].max(initial=0.0))
         open_patches = (ceilings > (1.0 + TOLERANCE) * attained) & region.holds(points, reaches)

@@ -29,7 +29,7 @@ def potentials(field: GravityField, points: ArrayLike) -> FloatArray:
     """
     points = _rows(points)
     values = np.zeros(len(points))
-    _fill_potentials(int(field.kind), field.params, points, values)
+    _fill_potentials(int(field.kind), field.params.copy(), points, values)
     return values
 
 
@@ -49,7 +49,7 @@ def accelerations(field: GravityField, points: ArrayLike) -> FloatArray:
     """
     points = _rows(points)
     values = np.zeros((len(points), 3))
-    _fill_accelerations(int(field.kind), field.params, points, values)
+    _fill_accelerations(int(field.kind), field.params.copy(), points, values)
     return values
 
 
@@ -70,7 +70,7 @@ def gradients(field: GravityField, points: ArrayLike) -> FloatArray:
     """
     points = _rows(points)
     values = np.zeros((len(points), 3, 3))
-    _fill_gradients(int(field.kind), field.params, points, values)
+    _fill_gradients(int(field.kind), field.params.copy(), points, values)
     return values
 
 
