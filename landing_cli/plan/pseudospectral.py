@@ -222,7 +222,7 @@ def _too_weak(free: _Solved) -> str:
 
     def reaches(share: float) -> bool:
         problem = replace(free.problem, thrust_share=(share,))
-        return solve_cone_program(build_program(problem), free.solution.x, FINE).status == "converged"
+        return solve_cone_program(build_program(problem), free.solution.x, ROUGH).status == "converged"
 
     bound = case.spacecraft.thrust_max_n
     low = 1.0
