@@ -44,6 +44,7 @@ _CONE_SHARE = 0.25  # of the nodes, inside the cone
 _CONE_NODES = 6  # at least
 _CORRECTIONS = 10  # of thrust bound, drift and clearance
 _DRAW = 1.5  # power of the excess by which the bound is drawn in: the peak grows back by some of it
+_WEAK_NODES = 16  # with which the thrust is told that a site would take
 _DOUBLINGS = 5  # of the thrust, in which one is looked for that suffices
 
 
@@ -76,7 +77,7 @@ def plan_pseudospectral(case: PlanCase, options: PseudospectralOptions | None = 
     free = without_terrain(case, options)
     if free.solution.status == "infeasible":
         parameters = _choices(free.problem, options)
-        why = _too_weak(free)
+        why = _too_weak(case, options)
         return no_plan(case, METHOD, "infeasible", why, iterations=free.rounds, parameters=parameters)
     first_s = first_time_to_go(case)
     starts = _either_side(free, _problem_at(case, options, case.tof_s - first_s))
@@ -158,11 +159,16 @@ def without_terrain(case: PlanCase, options: PseudospectralOptions) -> _Solved:
     _Solved
         A lower bound, up to the polynomial's own limits, and a first path.
     """
-    problem = gauss_problem(case, options.objective, options.terminal, 0, (options.nodes,))
-    path = boundary_cubic(case, problem.node_times_s)[:, :3]
-    start = start_point(problem, np.zeros_like(path), path)
+    problem, start = _free_problem(case, options)
     solution = solve_cone_program(build_program(problem), start, FINE)
     return _Solved(problem, solution, solution.rounds)
+
+
+def _free_problem(case: PlanCase, options: PseudospectralOptions) -> tuple[GaussProblem, FloatArray]:
+    """One phase without path bounds, and where to start."""
+    problem = gauss_problem(case, options.objective, options.terminal, 0, (options.nodes,))
+    path = boundary_cubic(case, problem.node_times_s)[:, :3]
+    return problem, start_point(problem, np.zeros_like(path), path)
 
 
 def _either_side(free: _Solved, problem: GaussProblem) -> list[FloatArray]:
@@ -216,13 +222,13 @@ def _at_entry(problem: GaussProblem, flown: Trajectory) -> FloatArray:
     return np.concatenate([flown.position_m[problem.entry], flown.velocity_m_s[problem.entry]])
 
 
-def _too_weak(free: _Solved) -> str:
-    """Say how much thrust the site would take without terrain and cone."""
-    case, share = free.problem.case, 1.0
+def _too_weak(case: PlanCase, options: PseudospectralOptions) -> str:
+    """Say how much thrust the site would take without terrain and cone; fewer nodes tell it well enough."""
+    share, problem, start = 1.0, *_free_problem(case, replace(options, nodes=min(options.nodes, _WEAK_NODES)))
 
     def reaches(share: float) -> bool:
-        problem = replace(free.problem, thrust_share=(share,))
-        return solve_cone_program(build_program(problem), free.solution.x, FINE).status == "converged"
+        program = build_program(replace(problem, thrust_share=(share,)))
+        return solve_cone_program(program, start, ROUGH).status == "converged"
 
     bound = case.spacecraft.thrust_max_n
     low = 1.0

@@ -163,7 +163,7 @@ class PseudospectralOptions:
     terminal : {"rest", "paper"}
         Land with position and velocity alone, or with eq 4's acceleration and angle too.
     nodes : int
-        Legendre-Gauss nodes.
+        Legendre-Gauss nodes: a quarter of them inside the cone, but no fewer than six; one or more before.
     """
 
     objective: Objective = "fuel"
