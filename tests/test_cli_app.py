@@ -241,6 +241,23 @@ def test_closed_descriptors_are_not_taken_by_files(tmp_path: Path) -> None:
     assert "standard input" in done.stderr
 
 
+@pytest.mark.parametrize("closed", ["2>&-", "<&- >&- 2>&-", "2>/dev/full"])
+def test_progress_goes_nowhere_where_stderr_cannot_be_written(closed: str) -> None:
+    code = (
+        "from landing_cli.cli import guard\n"
+        "def command(arguments):\n"
+        "    from landing_cli.cli.console import Console\n"
+        "    with Console().progress('facets') as progress:\n"
+        "        for done in range(3):\n"
+        "            progress(done, 2)\n"
+        "    return 0\n"
+        "guard.run_process(command)\n"
+    )
+    line = f'"$0" -c "$1" {closed}'
+    done = subprocess.run(["bash", "-c", line, sys.executable, code], check=False)
+    assert done.returncode == 0
+
+
 WAITING = "time.sleep(30)"
 DEAF = """
     while True:

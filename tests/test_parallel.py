@@ -290,7 +290,7 @@ def test_a_worker_that_does_not_answer_is_named_in_time(lone_scheduler: str, tmp
         began = time.monotonic()
         with pytest.raises(InputRefused, match=r"worker tcp://.* failed a first task: .*imeout"):
             list(run_chunks(toy_work.squares, CHUNKS, WorkPlan(1, "dask", lone_scheduler)))
-        assert time.monotonic() - began < 10.0
+        assert time.monotonic() - began < 30.0  # of the 60 s that a hung worker gets
 
 
 @contextmanager

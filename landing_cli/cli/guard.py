@@ -71,6 +71,8 @@ def run_process(command: Callable[[Sequence[str]], int]) -> NoReturn:
         Takes the arguments, returns the exit code; the heavy imports happen inside it.
     """
     _open_missing_streams()
+    if sys.stderr is None:  # it was closed when the interpreter began, and leads to nothing by now
+        sys.stderr = open(2, "w", closefd=False, errors="backslashreplace")  # noqa: SIM115
     _catch_signals()
     sys.stdout = _GuardedStdout(sys.stdout)
     try:
