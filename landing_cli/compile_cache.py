@@ -20,8 +20,8 @@ OPTIMISATION_LEVEL = "1"
 def fingerprint(package: Path) -> str:
     """Hash names, sizes and times of all files that hold kernels."""
     digest = hashlib.sha256()
-    for room in ROOMS:
-        for file in sorted((package / room).glob("**/*.py")):
+    for pattern in ("kernel*.py", *(f"{room}/**/*.py" for room in ROOMS)):
+        for file in sorted(package.glob(pattern)):
             if "figures" in file.parts:
                 continue
             status = file.stat()

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel_record import by_reference
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -15,6 +15,7 @@ Ints = NDArray[np.int64]
 Y_SIZE = 7
 
 
+@by_reference
 class Point(NamedTuple):
     """The primal-dual iterate (N intervals, J cones, R rows; scaled units)."""
 
@@ -27,6 +28,7 @@ class Point(NamedTuple):
     slack: Floats  # (R,) of the inequality rows
 
 
+@by_reference
 class Model(NamedTuple):
     """The problem linearised at a point."""
 
@@ -43,6 +45,7 @@ class Model(NamedTuple):
     y_hessian: Floats  # (7, 7)
 
 
+@by_reference
 class Step(NamedTuple):
     """Residuals, scalings, factors and the direction of one iteration."""
 
@@ -71,7 +74,6 @@ class Step(NamedTuple):
     d_slack: Floats  # (R,)
 
 
-@kernel
 def new_point(n_nodes: int, n_cones: int, n_rows: int) -> Point:
     """Return a zeroed iterate."""
     return Point(
@@ -85,7 +87,6 @@ def new_point(n_nodes: int, n_cones: int, n_rows: int) -> Point:
     )
 
 
-@kernel
 def new_model(n_nodes: int, n_cones: int, n_rows: int) -> Model:
     """Return a zeroed model."""
     return Model(
@@ -103,7 +104,6 @@ def new_model(n_nodes: int, n_cones: int, n_rows: int) -> Model:
     )
 
 
-@kernel
 def new_step(n_nodes: int, n_cones: int, n_rows: int) -> Step:
     """Return zeroed scratch space for an iteration."""
     return Step(

@@ -101,9 +101,17 @@ def _descent_integrals(case: ScaledCase, tube: Floats, q: Floats, p: Floats) -> 
 
 
 @kernel
-def _dual_feasible(case: ScaledCase, model: Model, multiplier: Floats, n_rows: int, duals: Floats) -> None:
-    """Make ``duals`` satisfy sum_j A_j' z_j = A_y' lambda, by way of the balls at the arc's two ends."""
+def _dual_feasible(
+    case: ScaledCase, model: Model, multiplier: Floats, n_rows: int, cone_dual: Floats, duals: Floats
+) -> None:
+    """Fill ``duals`` with ``cone_dual``, made to satisfy sum_j A_j' z_j = A_y' lambda.
+
+    This is done by way of the balls at the arc's two ends.
+    """
     arcs = case.arc_fractions.shape[0]
+    for j in range(arcs + 2):
+        for i in range(4):
+            duals[j, i] = cone_dual[j, i]
     for j in range(arcs, arcs + 2):
         z = duals[j]
         z[0] = max(z[0], math.sqrt(z[1] * z[1] + z[2] * z[2]))
@@ -167,8 +175,7 @@ def certified_thrust_level(
     bound : float
     """
     q, p = multiplier[0:3], multiplier[3:6]
-    duals[:, :] = cone_dual
-    _dual_feasible(case, model, multiplier, q.shape[0] + p.shape[0], duals)
+    _dual_feasible(case, model, multiplier, q.shape[0] + p.shape[0], cone_dual, duals)
     by_thrust, by_gravity = _descent_integrals(case, tube, q, p)
     work = _drift_work(case, target, q, p) - by_gravity
     W2 = case.spin * case.spin
@@ -198,7 +205,6 @@ def linearised_thrust_level(
     The same weak duality with frozen gravity, masses and planes: no proof about the facet, but once it
     is above 1 the least-energy iterations at full thrust have nothing to converge to.
     """
-    duals[:, :] = point.cone_dual
     work = by_thrust = 0.0
     for r in range(plan.n_rows):
         value = model.row_value[r]
@@ -209,7 +215,7 @@ def linearised_thrust_level(
         pull, F = model.row_pull[k], point.thrust[k]
         work -= pull[0] * F[0] + pull[1] * F[1] + pull[2] * F[2]
         by_thrust += math.sqrt(pull[0] * pull[0] + pull[1] * pull[1] + pull[2] * pull[2])
-    _dual_feasible(case, model, point.multiplier, plan.n_rows, duals)
+    _dual_feasible(case, model, point.multiplier, plan.n_rows, point.cone_dual, duals)
     for j in range(plan.n_cones):
         for i in range(4):
             work -= duals[j, i] * model.cone_offset[j, i]

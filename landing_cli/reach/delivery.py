@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import path_clearance
-from landing_cli.kernel import kernel
+from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel_record import by_reference
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
 from landing_cli.reach.scaled_case import ScaledCase, least_between
 from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
@@ -28,6 +29,7 @@ LIMIT_TOLERANCE = 1e-5
 CLEARANCE_SPACING = 1.0 / 40.0
 
 
+@by_reference
 class Frame(NamedTuple):
     """Physical facts of a case that the scaled problem does not carry."""
 
@@ -56,6 +58,7 @@ VALUE_COLUMNS = (
 )
 
 
+@by_reference
 class Deliveries(NamedTuple):
     """What is delivered for every facet of a batch."""
 
@@ -95,7 +98,7 @@ def _to_body(case: ScaledCase, samples: Floats, path_m: Floats) -> float:
     return least
 
 
-@kernel
+@inlined
 def deliver(
     case: ScaledCase,
     frame: Frame,

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.kernel import kernel
+from landing_cli.kernel_record import by_reference
 from landing_cli.optimize.conic_ipm import fill_row_pull
 from landing_cli.optimize.conic_records import Model, Point
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal, gravity_on_arc
@@ -39,6 +40,7 @@ SMALL_THRUST = 1e-3
 COAST = 5e-3
 
 
+@by_reference
 class Cuts(NamedTuple):
     """Tangent planes n . r >= level of the keep-out ellipsoid, each at one node."""
 
@@ -58,7 +60,6 @@ class Layout(NamedTuple):
     level: float  # |xi| that the cuts keep (1 plus a margin for the path between nodes)
 
 
-@kernel
 def new_cuts(size: int) -> Cuts:
     """Room for ``size`` cuts."""
     return Cuts(np.zeros(size, dtype=np.int64), np.zeros((size, 3)))

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import inlined, kernel
 from landing_cli.reach.free_batch import CutBatch
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level, least_between
 from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
@@ -32,7 +32,7 @@ def last_cut_node(case: ScaledCase, position: Floats) -> int:
     return n - 1 if case.on_ellipsoid else n
 
 
-@kernel
+@inlined
 def lowest_level(case: ScaledCase, position: Floats) -> float:
     """Least |xi| over the nodes of a path that may carry a tangent plane."""
     lowest = 1e9
@@ -42,7 +42,7 @@ def lowest_level(case: ScaledCase, position: Floats) -> float:
     return lowest
 
 
-@kernel
+@inlined
 def lowest_level_between(case: ScaledCase, thrust: Floats, samples: Floats) -> float:
     """Least |xi| of an accurate flight of ``thrust``, between the nodes too; fills ``samples``.
 
@@ -83,6 +83,12 @@ def _plane_normal(case: ScaledCase, k: int, u: Floats, normal: Floats) -> None:
 
 
 @kernel
+def _dot(u: Floats, v: Floats) -> float:
+    """Scalar product."""
+    return float(u[0] * v[0] + u[1] * v[1] + u[2] * v[2])
+
+
+@kernel
 def _dip(case: ScaledCase, position: Floats) -> tuple[int, int, int]:
     """Nodes before the entry, after the exit, and at the deepest point of a path's dip."""
     n = last_cut_node(case, position)
@@ -97,7 +103,7 @@ def _dip(case: ScaledCase, position: Floats) -> tuple[int, int, int]:
     return max(1, first - 1), min(n, last + 1), deepest
 
 
-@kernel
+@inlined
 def arc_cuts(case: ScaledCase, position: Floats, side: float, node: Ints, normal: Floats) -> int:
     """Fill tangent planes along an arc around the ellipsoid; return their number.
 
@@ -118,30 +124,41 @@ def arc_cuts(case: ScaledCase, position: Floats, side: float, node: Ints, normal
     _unit_coordinates(case, before, position[before], start)
     _unit_coordinates(case, after, position[after], end)
     _unit_coordinates(case, deepest, position[deepest], middle)
-    along = end - start
-    along /= max(math.sqrt(np.sum(along * along)), 1e-12)
-    out = middle - np.sum(middle * along) * along
-    norm = math.sqrt(np.sum(out * out))
+    along, out, u = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(3):
+        along[i] = end[i] - start[i]
+    norm = max(math.sqrt(_dot(along, along)), 1e-12)
+    for i in range(3):
+        along[i] /= norm
+    depth = _dot(middle, along)
+    for i in range(3):
+        out[i] = middle[i] - depth * along[i]
+    norm = math.sqrt(_dot(out, out))
     if norm < 1e-6:
         out[0], out[1], out[2] = -along[1], along[0], 0.0
         norm = math.sqrt(out[0] * out[0] + out[1] * out[1]) + 1e-12
-    out *= side / norm
-    angle = math.atan2(np.sum(start * along), np.sum(start * out))
-    sweep = math.atan2(np.sum(end * along), np.sum(end * out)) - angle
+    for i in range(3):
+        out[i] *= side / norm
+    angle = math.atan2(_dot(start, along), _dot(start, out))
+    sweep = math.atan2(_dot(end, along), _dot(end, out)) - angle
     count = 0
     for k in range(max(1, before - 1), min(n, after + 1) + 1):
         if before <= k <= after:
             phi = angle + sweep * (k - before) / max(1, after - before)
-            _plane_normal(case, k, math.cos(phi) * out + math.sin(phi) * along, normal[count])
+            for i in range(3):
+                u[i] = math.cos(phi) * out[i] + math.sin(phi) * along[i]
         else:
-            _unit_coordinates(case, k, position[k], middle)
-            _plane_normal(case, k, middle / math.sqrt(np.sum(middle * middle)), normal[count])
+            _unit_coordinates(case, k, position[k], u)
+            norm = math.sqrt(_dot(u, u))
+            for i in range(3):
+                u[i] /= norm
+        _plane_normal(case, k, u, normal[count])
         node[count] = k
         count += 1
     return count
 
 
-@kernel
+@inlined
 def freeze_on_path(
     case: ScaledCase, position: Floats, node: Ints, normal: Floats, count: int, level: float
 ) -> int:
@@ -159,7 +176,10 @@ def freeze_on_path(
     for c in range(count):
         k = node[c]
         _unit_coordinates(case, k, position[k], xi)
-        _plane_normal(case, k, xi / math.sqrt(np.sum(xi * xi)), normal[c])
+        norm = math.sqrt(_dot(xi, xi))
+        for i in range(3):
+            xi[i] /= norm
+        _plane_normal(case, k, xi, normal[c])
     return count
 
 

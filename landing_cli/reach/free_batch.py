@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.kernel import kernel
+from landing_cli.kernel_record import by_reference
 from landing_cli.reach.descent_model import Layout, layout
-from landing_cli.reach.free_solve import CONVERGED, Solver, new_solver, solve
+from landing_cli.reach.free_solve import CONVERGED, Solver, solve
 from landing_cli.reach.records import Binding
 from landing_cli.reach.scaled_case import ScaledCase
 from landing_cli.reach.shooting import pull_back
@@ -29,6 +30,7 @@ PROPELLANT = int(Binding.PROPELLANT) - 1
 HANDOVER = int(Binding.HANDOVER) - 1
 
 
+@by_reference
 class CutBatch(NamedTuple):
     """Tangent planes of every facet of a batch (n facets, room for C planes each)."""
 
@@ -37,6 +39,7 @@ class CutBatch(NamedTuple):
     normal: Floats  # (n, C, 3) solver axes
 
 
+@by_reference
 class Batch(NamedTuple):
     """How the solves of a batch ended."""
 
@@ -141,6 +144,7 @@ def solve_many(
     limit: int,
     tube: Floats,
     arc_bound: float,
+    solver: Solver,
     out: Batch,
 ) -> None:
     """Solve every facet of a batch from a cold start.
@@ -165,23 +169,30 @@ def solve_many(
         Most iterations a facet.
     tube, arc_bound : (N,) float, float
         Bounds of gravity for the certificate.
+    solver : Solver
+        Work space for the case.
     out : Batch
         Filled.
     """
-    solver = new_solver(case)
     for i in range(targets.shape[0]):
         count = cuts.planes[i]
         for c in range(count):
             solver.cuts.node[c] = cuts.node[i, c]
-            solver.cuts.normal[c] = cuts.normal[i, c]
+            for a in range(3):
+                solver.cuts.normal[c, a] = cuts.normal[i, c, a]
         plan = layout(case, count, energy_weight, tau_free, keep_level[i])
         outcome = solve(case, targets[i], normals[i], plan, retake_from, tube, arc_bound, limit, solver)
         out.status[i], out.iterations[i] = outcome.status, outcome.iterations
         out.energy[i], out.level[i], out.bound[i] = outcome.energy, solver.point.y[0], outcome.bound
-        out.thrust[i] = solver.point.thrust
-        out.position[i] = solver.path.position
+        for k in range(out.thrust.shape[1]):
+            for a in range(3):
+                out.thrust[i, k, a] = solver.point.thrust[k, a]
+        for k in range(out.position.shape[1]):
+            for a in range(3):
+                out.position[i, k, a] = solver.path.position[k, a]
         for c in range(count):
-            cuts.normal[i, c] = solver.cuts.normal[c]
+            for a in range(3):
+                cuts.normal[i, c, a] = solver.cuts.normal[c, a]
         if outcome.status == CONVERGED:
             _keep_costates(case, plan, solver, outcome.mass_costate, out.costates[i])
             _keep_pressure(case, plan, solver, out.pressure[i])

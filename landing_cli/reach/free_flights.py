@@ -15,7 +15,7 @@ from landing_cli.reach.ellipsoid_arcs import (
     lowest_levels_between,
 )
 from landing_cli.reach.free_batch import Batch, CutBatch, new_batch, no_cuts, solve_many
-from landing_cli.reach.free_solve import CONVERGED, STALLED
+from landing_cli.reach.free_solve import CONVERGED, STALLED, new_solver
 from landing_cli.reach.scaled_case import ScaledCase
 
 Floats = NDArray[np.float64]
@@ -182,6 +182,7 @@ def _solve(question: Question, cuts: CutBatch, level: Floats, retake_from: int, 
         limit,
         question.tube,
         question.arc_bound,
+        new_solver(question.case),
         out,
     )
     return out

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel_record import by_reference
 from landing_cli.optimize.conic_ipm import advance, residuals
 from landing_cli.optimize.conic_records import Model, Point, Step, new_model, new_point, new_step
 from landing_cli.reach.certificate import certified_thrust_level, linearised_thrust_level
@@ -42,6 +43,7 @@ FIRST_BLOCKED, BLOCKED_LEVEL = 8, 1.0 + 1e-4
 FIRST_DEFECT, DEFECT_PERIOD = 1, 4
 
 
+@by_reference
 class Solver(NamedTuple):
     """Everything one facet's solve works in; allocated once and used for many facets."""
 
@@ -63,7 +65,6 @@ class Outcome(NamedTuple):
     mass_costate: float  # at the start
 
 
-@kernel
 def new_solver(case: ScaledCase) -> Solver:
     """Allocate a solver for a scaled case."""
     n = case.mid_cos.shape[0]
@@ -147,7 +148,7 @@ def cold_start(case: ScaledCase, target: Floats, normal: Floats, plan: Layout, s
         point.cone_dual[j, 0] = 0.1 * scale
 
 
-@kernel
+@inlined
 def solve(
     case: ScaledCase,
     target: Floats,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.gravity.kernels import acceleration, acceleration_and_gradient
 from landing_cli.kernel import kernel
+from landing_cli.kernel_record import by_reference
 from landing_cli.reach.records import LandingCase
 
 Floats = NDArray[np.float64]
@@ -29,6 +30,7 @@ FEW_FRACTIONS, MANY_FRACTIONS, STRONG_GRAVITY = 5, 17, 0.02
 CORE = 0.6
 
 
+@by_reference
 class ScaledCase(NamedTuple):
     """A landing case, scaled (see the module's docstring), discretised in N equal intervals."""
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.kernel import kernel
+from landing_cli.kernel_record import by_reference
 from landing_cli.reach.scaled_case import ScaledCase, gravity_and_gradient, gravity_in_space
 
 Floats = NDArray[np.float64]
@@ -22,6 +23,7 @@ Floats = NDArray[np.float64]
 SUBSTEPS = 2
 
 
+@by_reference
 class Path(NamedTuple):
     """A descent flown through N intervals (scaled units, solver axes)."""
 
@@ -33,7 +35,6 @@ class Path(NamedTuple):
     samples: Floats  # (N + 1, 7) scratch space of the accurate flight
 
 
-@kernel
 def new_path(n_intervals: int) -> Path:
     """A zeroed path."""
     return Path(
@@ -152,7 +153,8 @@ def fly_accurately(case: ScaledCase, thrust: Floats, samples: Floats) -> None:
     for i in range(3):
         s[i], s[3 + i] = case.position[i], case.velocity[i]
     s[6] = 1.0
-    samples[0, :] = s
+    for i in range(7):
+        samples[0, i] = s[i]
     # the body's angle at the start and at the middle and end of each step, turned on by half a step
     old_c, old_s = math.cos(case.spin), -math.sin(case.spin)
     turn_c, turn_s = math.cos(0.5 * h * case.spin), math.sin(0.5 * h * case.spin)
@@ -187,7 +189,8 @@ def fly_accurately(case: ScaledCase, thrust: Floats, samples: Floats) -> None:
             s[6] = end
             old_c, old_s = end_c, end_s
             row += 1
-            samples[row, :] = s
+            for i in range(7):
+                samples[row, i] = s[i]
 
 
 @kernel

@@ -1,0 +1,89 @@
+"""Records that kernels are handed by reference.
+
+numba passes a NamedTuple by value, each array in it as eight numbers, and takes it apart and together again
+at every call and every field: with dozens of arrays that is most of what a compilation costs. A class marked
+``by_reference`` reaches a kernel, and each kernel that one calls, as one pointer to its fields. Kernels read
+the fields and write into the arrays. They cannot make such a record, nor return it or an array of it: both
+are lent without a count of references and live as long as the call from Python.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from numba import extending, types
+from numba.core import cgutils
+from numba.core.typing import templates
+
+# numba's own functions are not typed
+_types: Any = types
+_extending: Any = extending
+_cgutils: Any = cgutils
+_Template: Any = templates.AttributeTemplate
+_PointerModel: Any = extending.models.PointerModel
+
+Class = TypeVar("Class", bound=type)
+
+
+class RecordType(types.Type):
+    """A record of one class, with the types of its fields."""
+
+    def __init__(self, record: type, fields: tuple[Any, ...]) -> None:
+        self.record, self.fields = record, _types.NamedTuple(fields, record)
+        super().__init__(f"Record({self.fields.name})")
+
+    @property
+    def key(self) -> Any:
+        """What makes two record types the same."""
+        return self.fields
+
+
+def by_reference(record: Class) -> Class:
+    """Let kernels take a NamedTuple class by reference."""
+
+    @_extending.typeof_impl.register(record)
+    def typeof_record(value: Any, context: Any) -> RecordType:
+        return RecordType(record, tuple(_extending.typeof_impl(field, context) for field in value))
+
+    return record
+
+
+@_extending.register_model(RecordType)
+class _RecordModel(_PointerModel):  # type: ignore[misc]
+    """A pointer to the fields, which lie in the frame of the call from Python."""
+
+    def __init__(self, manager: Any, record: RecordType) -> None:
+        super().__init__(manager, _types.CPointer(record.fields))
+
+
+@_extending.infer_getattr
+class _RecordFields(_Template):  # type: ignore[misc]
+    key = RecordType
+
+    def generic_resolve(self, record: Any, name: Any) -> Any:
+        """Type of a field."""
+        if name in record.fields.fields:
+            return record.fields.types[record.fields.fields.index(name)]
+        return None
+
+
+@_extending.lower_getattr_generic(RecordType)
+def _load_field(context: Any, builder: Any, record: RecordType, pointer: Any, name: str) -> Any:
+    """Load one field from where it lies."""
+    place = record.fields.fields.index(name)
+    model = context.data_model_manager[record.fields.types[place]]
+    value: Any = model.load_from_data_pointer(builder, _cgutils.gep_inbounds(builder, pointer, 0, place))
+    if isinstance(record.fields.types[place], types.Array):
+        array = context.make_array(record.fields.types[place])(context, builder, value)
+        array.meminfo = _cgutils.get_null_value(array.meminfo.type)
+        value = array._getvalue()
+    return value
+
+
+@_extending.unbox(RecordType)
+def _unbox_record(record: RecordType, value: Any, c: Any) -> Any:
+    """Unbox the fields into the frame of the call."""
+    native = c.unbox(record.fields, value)
+    model = c.context.data_model_manager[record.fields]
+    place = _cgutils.alloca_once_value(c.builder, model.as_data(c.builder, native.value))
+    return _extending.NativeValue(place, is_error=native.is_error, cleanup=native.cleanup)
