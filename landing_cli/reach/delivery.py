@@ -167,7 +167,7 @@ def deliver(
     glide = frame.half_angle_rad - arc.glide_angle_rad
     fuel = frame.mass_kg - arc.touchdown_mass_kg
     excess = max(peak - 1.0, peak_final - 1.0, -margin, -glide, off_ellipsoid)
-    excess = max(excess, (fuel - frame.propellant_kg) / frame.mass_kg)
+    excess = max(excess, fuel / frame.propellant_kg - 1.0)
     clearance, _facet = path_clearance(
         surface, path_m, frame.clear_radius_m, 1e-3, CLEARANCE_SPACING * frame.clear_radius_m
     )
