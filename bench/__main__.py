@@ -1,5 +1,16 @@
-"""``python -m bench``: the facet solve beside its baselines."""
+"""``python -m bench [facets | clearance | plans]``: our kernels beside what a user would use instead."""
 
-from bench.facet_solve import main
+from __future__ import annotations
 
-main()
+import sys
+
+from bench import clearance_bench, facet_solve, plan_bench
+
+BENCHES = {"facets": facet_solve.main, "clearance": clearance_bench.main, "plans": plan_bench.main}
+
+first = sys.argv[1] if len(sys.argv) > 1 else ""
+if first in BENCHES:
+    del sys.argv[1]  # what follows are that bench's own options
+for name in [first] if first in BENCHES else list(BENCHES):
+    print(f"\n== {name}", flush=True)
+    BENCHES[name]()

@@ -180,6 +180,7 @@ def compare(case: LandingCase, facets: np.ndarray) -> list[Row]:
         extremals(free),
         slsqp(case, facets, "costates", "scipy", "slsqp costates"),
         slsqp(case, facets, "costates", "compiled", "slsqp costates, compiled differences"),
+        slsqp(case, facets, "nodes", "scipy", "slsqp nodes"),
         slsqp(case, facets, "nodes", "compiled", "slsqp nodes, compiled differences"),
         *ipopt(case, facets),
     ]
@@ -219,10 +220,13 @@ def main() -> None:
     for case in bennu_cases(options.cases):
         total = len(case.asteroid.mesh.faces)
         facets = np.unique(np.linspace(0, total - 1, options.facets).astype(np.int64))
-        print_case(case, facets, compare(case, facets), options.list)
+        rows = compare(case, facets)
+        print_case(case, facets, rows, options.list)
         every = Ours.of(case, np.arange(total))
         cpu_s, share = every.row.cpu_s, every.row.reachable.sum() / total
         print(f"ours over all {total} facets: {1e3 * cpu_s:.3f} ms CPU a facet, {share:.1%} reachable")
+        told = ", ".join(f"{row.method} {row.cpu_s / cpu_s:.0f}" for row in rows if "slsqp" in row.method)
+        print(f"times that: {told}")
         flops = every.iterations() * flops_of_iteration(INTERVALS) / cpu_s
         print(
             f"{every.iterations():.1f} iterations a facet: at least {flops / 1e9:.1f} Gflop/s (planes and"

@@ -55,11 +55,12 @@ unreachable, {sums[3]} false certificates.
 {table(columns, [row[:-1] for row in rows])}
 
 The goal is J within {GOAL_P99:g} (p99) and {GOAL_WORST:g} (worst). Tables that miss it:
-{", ".join(row[0] for row in rows if not row[-1]) or "none"}. Right verdicts there do not make J right. Known: where the
-flight of least energy misses a limit by a hair between nodes, the flight of least thrust is handed out, at a higher
-J; and `eros` keeps the handover's mass throughout the final stage, which moves its truth by up to 0.4 %
-(tests/truth/README.md; `eros_flown_mass` lets the mass fall). How much of each error either explains is not measured
-here. Delta-v and fuel of a case whose table misses the goal deserve the same doubt.
+{", ".join(row[0] for row in rows if not row[-1]) or "none"}. Right verdicts there do not make J right. Known: the time
+grid is coarse (40 intervals, 100 where the flight is at full thrust most of the time); planes that keep the path off
+the ellipsoid stand a little above it; around Eros a flight may lead another way than the best; and `eros` keeps the
+handover's mass throughout the final stage, which moves its truth by up to 0.4 % (tests/truth/README.md;
+`eros_flown_mass` lets the mass fall). How much of each error each explains is not measured here.
+Delta-v and fuel of a case whose table misses the goal deserve the same doubt.
 """
 
 

@@ -167,7 +167,7 @@ def test_a_mission_of_a_later_version_says_that_it_is_not_there(
     assert len(err.splitlines()) == 1
 
 
-def test_help_imports_nothing_heavy_and_is_fast(tmp_path: Path) -> None:
+def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
     code = (
         "import sys\nfrom landing_cli.cli.app import main\n"
         "assert main('landing', ['--help']) == 0\nassert main('reach', ['run', '--help']) == 0\n"
@@ -178,15 +178,6 @@ def test_help_imports_nothing_heavy_and_is_fast(tmp_path: Path) -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path
     )
     assert done.stderr.strip() == "[]"
-    spent = []
-    for _ in range(3):
-        before = os.times()
-        subprocess.run([*script("reach"), "run", "--help"], capture_output=True, check=True, cwd=tmp_path)
-        after = os.times()
-        spent.append(
-            after.children_user + after.children_system - before.children_user - before.children_system
-        )
-    assert min(spent) < 0.3
 
 
 def test_completion_scripts_and_scenario_names_are_offered(tmp_path: Path) -> None:

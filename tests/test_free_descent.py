@@ -270,9 +270,9 @@ def test_a_facet_that_only_the_propellant_keeps_away_says_so() -> None:
     lost = reachable(free) & ~reachable(tight)
     assert lost.sum() > 20
     assert (tight.rows["binding"][lost] == Binding.PROPELLANT).all()
-    needed = bound + 2000.0 * tight.rows["violation"][lost]
+    needed = bound * (1.0 + tight.rows["violation"][lost])
     np.testing.assert_allclose(needed, free.rows["fuel_kg"][lost], rtol=0.05)
-    assert (needed <= free.rows["fuel_kg"][lost] * (1.0 + 1e-3)).all()
+    assert needed.min() > bound
     beyond = ~reachable(free)
     np.testing.assert_array_equal(tight.rows["verdict"][beyond], free.rows["verdict"][beyond])
 

@@ -87,7 +87,7 @@ def _deliver(
     glide = frame.half_angle_rad - arc.glide_angle_rad
     fuel = frame.mass_kg - arc.touchdown_mass_kg
     excess = max(peak - 1.0, peak_final - 1.0, -margin, -glide, off_ellipsoid)
-    excess = max(excess, (fuel - frame.propellant_kg) / frame.mass_kg)
+    excess = max(excess, fuel / frame.propellant_kg - 1.0)
     path = path_m[: steps + 1 + ARC_SAMPLES]
     clearance, _facet = path_clearance(
         surface, path, frame.clear_radius_m, 1e-3, CLEARANCE_SPACING * frame.clear_radius_m

@@ -47,8 +47,7 @@ def tell_facet(result: CaseResult, facet: int) -> str:
     if facet in result.lost:
         return f"{told} unresolved: it was lost, {result.lost[facet]}"
     if Binding(int(row["binding"])) is Binding.PROPELLANT:
-        craft = result.case.spacecraft
-        burnt = (craft.propellant_kg or 0.0) + float(row["violation"]) * craft.mass_kg
+        burnt = (result.case.spacecraft.propellant_kg or 0.0) * (1.0 + float(row["violation"]))
         return f"{told} unresolved: no flight within the propellant was found, the best burns {burnt:.4g} kg"
     return f"{told} unresolved: no search converged{_attempt(row)}"
 

@@ -29,10 +29,10 @@ ENERGY_ONLY, MARGIN_WEIGHT = 1.0, 1e-3
 TOUCH = 1.0 - 1e-6
 # Nodes of a given path that lie below this are held above the ellipsoid; how often the planes follow.
 NEAR, FOLLOWED = 1.2, 3
-# |xi| that the tangent planes keep at first. Where a path still dips between two nodes below FLOOR, its
-# planes are raised by so many times the shortfall and the facet is solved again, ever more boldly. FLOOR
-# leaves room for what a parabola through three samples misses.
-CUT_LEVEL, FLOOR, RAISES = 1.0 + 4e-4, 1.0 + 1.2e-5, (1.2, 1.2, 1.2, 1.5, 2.0, 3.0, 5.0)
+# Tangent planes keep |xi| at 1 + SAG / N^2 at first: that is what paths between N nodes sag below them. Where
+# one still dips between two nodes below FLOOR, its planes are raised by so many times the shortfall and the
+# facet is solved again, ever more boldly. FLOOR leaves room for what a parabola through three samples misses.
+SAG, FLOOR, RAISES = 0.64, 1.0 + 1.2e-5, (1.2, 1.2, 1.2, 1.5, 2.0, 3.0, 5.0)
 
 
 class Question(NamedTuple):
@@ -62,7 +62,7 @@ def best_flights(question: Question) -> tuple[Batch, Flags]:
         Whether the free flight dips into the ellipsoid, so that the answer leads around it.
     """
     n, intervals = len(question.targets), len(question.case.mid_cos)
-    best = _solve(question, no_cuts(n, intervals), np.full(n, CUT_LEVEL), NEVER, FREE_LIMIT)
+    best = _solve(question, no_cuts(n, intervals), _cut_levels(question), NEVER, FREE_LIMIT)
     lowest = np.empty(n)
     lowest_levels(question.case, best.position, lowest)
     around = (best.status == CONVERGED) & (lowest < TOUCH)
@@ -104,7 +104,7 @@ def flights_near(question: Question, position: Floats) -> Batch:
         CONVERGED where a flight was found.
     """
     n, intervals = len(question.targets), len(question.case.mid_cos)
-    flights, cuts, level = new_batch(n, intervals), no_cuts(n, intervals), np.full(n, CUT_LEVEL)
+    flights, cuts, level = new_batch(n, intervals), no_cuts(n, intervals), _cut_levels(question)
     flights.position[:] = position
     for _ in range(FOLLOWED):
         _solve_again(question, flights, cuts, np.full(n, NEAR), level, np.arange(n))
@@ -118,12 +118,16 @@ def _around(question: Question, free_position: Floats, side: float) -> tuple[Bat
     n, intervals = len(question.targets), len(case.mid_cos)
     cuts = no_cuts(n, intervals)
     arc_cuts_many(case, free_position, side, cuts)
-    level = np.full(n, CUT_LEVEL)
+    level = _cut_levels(question)
     flights = _solve(question, cuts, level, RETAKE_FROM, CUT_LIMIT)
     froze = flights.status == STALLED
     _solve_again(question, flights, cuts, np.full(n, TOUCH), level, np.flatnonzero(froze))
     _raise_over_dips(question, flights, cuts, level)
     return flights, froze
+
+
+def _cut_levels(question: Question) -> Floats:
+    return np.full(len(question.targets), 1.0 + SAG / len(question.case.mid_cos) ** 2)
 
 
 def _raise_over_dips(question: Question, flights: Batch, cuts: CutBatch, level: Floats) -> None:
