@@ -20,8 +20,9 @@ from landing_cli.scenario.load import parse
 SHIPPED = sorted((ROOT / "configs").glob("**/*.yaml"))
 
 MISSING, MISSPELT = object(), object()
-# values that may have either sign, and keys that may be left out
-SIGNED = ("position_km", "position_m", "velocity_m_s", "azimuth_deg")
+# values that may have either sign, those that may be zero, and keys that may be left out
+SIGNED = ("position_km", "position_m", "velocity_m_s", "acceleration_m_s2", "azimuth_deg")
+ZERO = ("facet", "clearance_m", "rotation_rate_rad_s")
 OPTIONAL = (
     "length_unit",
     "origin",
@@ -37,6 +38,13 @@ OPTIONAL = (
     "method",
     "h_m",
     "azimuth_deg",
+    "rotation_rate_rad_s",  # without it the message asks for the period
+    "acceleration_m_s2",
+    "clearance_m",
+    "clearance",
+    "cone_half_angle_deg",
+    "mass_model",
+    "longitudes",
 )
 Path_ = tuple[str | int, ...]
 
@@ -70,7 +78,8 @@ def mutations(path: Path_, value: Any) -> Iterator[tuple[str, Any]]:
         yield "misspelt value", f"{value}?"
     if number and value > 0 and named not in SIGNED:
         yield "sign", -value
-        yield "zero", 0
+        if named not in ZERO:
+            yield "zero", 0
     if not in_list:
         yield "misspelt", MISSPELT
     if not in_list and named not in OPTIONAL:
