@@ -22,7 +22,7 @@ from landing_cli.kernel import kernel
 
 Floats = NDArray[np.float64]
 
-ARC_SAMPLES = 32
+ARC_SAMPLES = 64
 
 
 class ArcMeasures(NamedTuple):

@@ -60,7 +60,7 @@ LIMITS: Mapping[str, float] = {
 # How far stored columns may be from the flown ones: relative to the value, or absolute.
 RELATIVE: Mapping[str, float] = {
     "performance_index_m2_s3": 1e-5,
-    "delta_v_m_s": 2e-4,  # integrated over 32 intervals of the final arc
+    "delta_v_m_s": 2e-4,  # integrated over 64 intervals of the final arc
     "fuel_kg": 2e-4,
     "handover_mass_kg": 1e-5,
 }
