@@ -1,8 +1,8 @@
 """How kernels are compiled: cached, without the GIL, with C's division, and without a wrapper for C.
 
-Two traps of numba's: a function is compiled again for each literal argument (pass a variable's value
-instead), and optimised again inside each function that calls it. ``inlined`` spares the latter for short
-functions with one caller; long ones compile slower inlined.
+Two traps of numba's: a function is compiled again for each literal argument, also for a variable that
+begins as one (begin with ``np.int64(0)``), and optimised again inside each function that calls it. For short
+functions with one caller, ``inlined`` spares the latter; long ones compile slower inlined.
 """
 
 from __future__ import annotations

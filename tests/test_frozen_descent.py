@@ -10,7 +10,7 @@ from landing_samples import landing_case
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.optimize.conic_records import Model, Point, new_model, new_point, new_step
-from landing_cli.reach.descent_model import Layout, layout, new_cuts
+from landing_cli.reach.descent_model import Layout, layout, new_cuts, refresh
 from landing_cli.reach.free_solve import Solver, cold_start
 from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal, scale_case
@@ -51,6 +51,7 @@ def frozen(
             solver.cuts.node[c] = k
             solver.cuts.normal[c] = ellipsoid_normal(scaled, scaled.node_cos[k], scaled.node_sin[k], *x)
     cold_start(scaled, target, normals[facet], plan, solver)
+    refresh(scaled, target, plan, solver.cuts, False, solver.point, solver.path, solver.model)
     return (
         solver.point,
         solver.model,

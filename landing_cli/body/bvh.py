@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from landing_cli.body.adjacency import facet_neighbours
 from landing_cli.body.mesh import Mesh, facet_centroids, facet_normals
 from landing_cli.kernel import kernel
+from landing_cli.kernel_record import by_reference
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -26,6 +27,7 @@ FACE, EDGE_AB, EDGE_BC, EDGE_CA, CORNER_A, CORNER_B, CORNER_C = range(7)
 """The feature of a facet on which the closest point lies."""
 
 
+@by_reference
 class SurfaceIndex(NamedTuple):
     """The surface of a closed mesh, arranged for distance queries (build_surface_index makes it).
 
@@ -217,8 +219,9 @@ def closest_slot(
     """
     boxes, triangles, depth = surface.boxes, surface.triangles, surface.depth
     count, leaves = triangles.shape[0], 1 << depth
-    node, pending = 1, 1  # pending: a sentinel, then one bit a level, set where the sibling has to be visited
-    if box_distance2(boxes, 1, x, y, z) >= bound2:
+    # pending: a sentinel, then one bit a level, set where the sibling has to be visited
+    node, pending = np.int64(1), np.int64(1)
+    if box_distance2(boxes, node, x, y, z) >= bound2:
         return bound2, slot, feature
     while True:
         descended = False

@@ -130,7 +130,7 @@ def signed_distances_into(
     surface: SurfaceIndex, points: FloatArray, distances: FloatArray, facets: IntArray
 ) -> None:
     """Write the signed distances (n,), m, and the closest facets (n,) of (n, 3) points."""
-    slot = 0
+    slot = np.int64(0)
     for i in range(points.shape[0]):
         distances[i], slot = signed_distance_from(surface, points[i, 0], points[i, 1], points[i, 2], slot)
         facets[i] = surface.facets[slot]
@@ -169,7 +169,7 @@ def path_clearance(
     """
     last = path.shape[0] - 1
     tx, ty, tz = path[last, 0], path[last, 1], path[last, 2]
-    least, facet, slot = np.inf, -1, 0
+    least, facet, slot = np.inf, -1, np.int64(0)
     known, kx, ky, kz = -np.inf, tx, ty, tz  # the last distance that was computed, and where
     for k in range(last, -1, -1):
         j = min(k + 1, last)  # the chord from point j back to point k

@@ -51,7 +51,7 @@ def distances_with_slopes(surface: SurfaceIndex, points: ArrayLike) -> tuple[Flo
 
 @kernel
 def _fill(surface: SurfaceIndex, points: FloatArray, distances: FloatArray, slopes: FloatArray) -> None:
-    slot = 0
+    slot = np.int64(0)
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         distance2, feature = triangle_distance2(surface.triangles, slot, x, y, z)
@@ -117,7 +117,7 @@ def vertices_with_slopes(surface: SurfaceIndex, points: ArrayLike) -> tuple[Floa
 def _fill_vertices(
     surface: SurfaceIndex, points: FloatArray, distances: FloatArray, slopes: FloatArray
 ) -> None:
-    slot = 0
+    slot = np.int64(0)
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         distances[i], slot = vertex_distance(surface, x, y, z, slot)

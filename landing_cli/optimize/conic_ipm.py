@@ -21,7 +21,7 @@ so that an inequality row has lambda = -eta with eta >= 0 complementary to its s
 
 from __future__ import annotations
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import inlined, kernel
 from landing_cli.optimize.conic_records import Y_SIZE, Model, Point, Step
 from landing_cli.optimize.second_order_cone import (
     UNBOUNDED,
@@ -156,7 +156,7 @@ def _eliminate_nodes(point: Point, model: Model, step: Step, n_rows: int) -> Non
                     schur[i, j] += b0 * T[0] + b1 * T[1] + b2 * T[2]
 
 
-@kernel
+@inlined
 def factorise(
     point: Point, model: Model, step: Step, n_equal: int, n_rows: int, n_cones: int, tau_free: bool
 ) -> None:
@@ -242,9 +242,9 @@ def _right_hand_side(
         w, o, d = step.node_scaling[k], step.node_shift[k], step.d_thrust[k]
         z = point.node_dual[k]
         if corrector:
-            o[0], o[1], o[2], o[3] = complementarity_shift(
-                w, w[4], z, (d_tau, d[0], d[1], d[2]), step.d_node_dual[k], target
-            )
+            ball = step.d_ball
+            ball[0], ball[1], ball[2], ball[3] = d_tau, d[0], d[1], d[2]
+            o[0], o[1], o[2], o[3] = complementarity_shift(w, w[4], z, ball, step.d_node_dual[k], target)
         else:
             o[0], o[1], o[2], o[3] = -z[0], -z[1], -z[2], -z[3]
         inverse, f, h = step.node_inverse[k, 0], step.node_inverse[k, 1], step.node_inverse[k, 2]
@@ -338,26 +338,6 @@ def _recover_nodes(point: Point, model: Model, step: Step, n_rows: int) -> float
 
 
 @kernel
-def _direction(
-    point: Point,
-    model: Model,
-    step: Step,
-    n_equal: int,
-    n_rows: int,
-    n_cones: int,
-    target: float,
-    tau_free: bool,
-) -> float:
-    """Solve the Newton system for one right-hand side; return the longest feasible step."""
-    _right_hand_side(point, model, step, n_equal, n_rows, n_cones, target, tau_free)
-    _solve_dense(step, n_rows)
-    return min(
-        _recover_cones(point, model, step, n_equal, n_rows, n_cones),
-        _recover_nodes(point, model, step, n_rows),
-    )
-
-
-@kernel
 def advance(
     point: Point,
     model: Model,
@@ -378,9 +358,16 @@ def advance(
     """
     degree = point.thrust.shape[0] + n_cones + n_rows - n_equal
     factorise(point, model, step, n_equal, n_rows, n_cones, tau_free)
-    affine = min(1.0, _direction(point, model, step, n_equal, n_rows, n_cones, 0.0, tau_free))
-    target = max((1.0 - affine) ** 3 * gap / degree, smallest_target)
-    longest = _direction(point, model, step, n_equal, n_rows, n_cones, target, tau_free)
+    target = longest = 0.0
+    for corrected in (False, True):
+        _right_hand_side(point, model, step, n_equal, n_rows, n_cones, target, tau_free)
+        _solve_dense(step, n_rows)
+        longest = min(
+            _recover_cones(point, model, step, n_equal, n_rows, n_cones),
+            _recover_nodes(point, model, step, n_rows),
+        )
+        if not corrected:
+            target = max((1.0 - min(1.0, longest)) ** 3 * gap / degree, smallest_target)
     length = min(1.0, FRACTION_TO_BOUNDARY * longest)
     for a in range(Y_SIZE):
         point.y[a] += length * step.d_y[a]

@@ -66,6 +66,7 @@ class Step(NamedTuple):
     rhs_rows: Floats  # (R,)
     rhs_y: Floats  # (7,)
     d_thrust: Floats  # (N, 3)
+    d_ball: Floats  # (4,) of tau and one node's thrust
     d_node_dual: Floats  # (N, 4)
     d_y: Floats  # (7,)
     d_cone_slack: Floats  # (J, 4)
@@ -124,6 +125,7 @@ def new_step(n_nodes: int, n_cones: int, n_rows: int) -> Step:
         np.zeros(n_rows),
         np.zeros(Y_SIZE),
         np.zeros((n_nodes, 3)),
+        np.zeros(4),
         np.zeros((n_nodes, 4)),
         np.zeros(Y_SIZE),
         np.zeros((n_cones, 4)),

@@ -99,7 +99,7 @@ def complementarity_shift(
     w: Floats,
     inverse_beta2: float,
     z: Floats,
-    affine_ds: tuple[float, float, float, float] | Floats,
+    affine_ds: Floats,
     affine_dz: Floats,
     target: float,
 ) -> tuple[float, float, float, float]:

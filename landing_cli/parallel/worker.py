@@ -26,15 +26,21 @@ def serve(connection: Connection, parent: int) -> None:
         Process id of the parent; the worker dies with it.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _die_with(parent)
+    die_with(parent)
     try:
         _answer(connection)
     except (EOFError, OSError):
         return  # the parent is gone
 
 
-def _die_with(parent: int) -> None:
-    """Ask the kernel for SIGKILL when the parent dies, however it dies."""
+def die_with(parent: int) -> None:
+    """Ask the kernel for SIGKILL when the parent dies, however it dies.
+
+    Parameters
+    ----------
+    parent : int
+        Process id of the parent.
+    """
     libc = ctypes.CDLL(None)
     if hasattr(libc, "prctl"):
         libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)

@@ -76,7 +76,7 @@ def check_path(
         Verdict, the distance of the sample at fault (m; what is asked where none is) and how many distances
         were computed.
     """
-    slot, corner, measured = 0, 0, 0
+    slot, corner, measured = np.int64(0), np.int64(0), 0
     slack, kx, ky, kz = -1.0, 0.0, 0.0, 0.0
     for k in range(path.shape[0] - 1, -1, -1):
         x, y, z = path[k, 0], path[k, 1], path[k, 2]
@@ -127,7 +127,7 @@ def least_distance(
     (float, int)
         Distance (m) and sample; infinity and -1 for an empty stretch.
     """
-    least, where, slot, corner = np.inf, -1, 0, 0
+    least, where, slot, corner = np.inf, -1, np.int64(0), np.int64(0)
     slack, kx, ky, kz = -1.0, 0.0, 0.0, 0.0
     for k in range(stop - 1, start - 1, -1):
         x, y, z = path[k, 0], path[k, 1], path[k, 2]

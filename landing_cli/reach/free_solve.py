@@ -25,6 +25,7 @@ from landing_cli.reach.descent_model import (
     fill_handover_rows,
     new_cuts,
     refresh,
+    refresh_arc,
 )
 from landing_cli.reach.scaled_case import ScaledCase
 from landing_cli.reach.shooting import Path, fly, measure_defect, new_path
@@ -80,7 +81,7 @@ def new_solver(case: ScaledCase) -> Solver:
     )
 
 
-@kernel
+@inlined
 def _start_thrust(case: ScaledCase, target: Floats, normal: Floats, solver: Solver) -> None:
     """Least-energy thrust to a plausible handover, from the unpowered flight's miss, clipped.
 
@@ -134,8 +135,8 @@ def cold_start(case: ScaledCase, target: Floats, normal: Floats, plan: Layout, s
     for r in range(plan.n_equal, plan.n_rows):
         point.slack[r] = 0.05
         point.multiplier[r] = -0.05 * scale
-    retake = plan.n_cuts < 0  # never: they were just given
-    refresh(case, target, plan, solver.cuts, retake, point, solver.path, model)
+    fly(case, point.thrust, solver.path)
+    refresh_arc(case, target, float(solver.path.mass[n]), model, point.y)
     for j in range(plan.n_cones):
         s, norm2 = point.cone_slack[j], 0.0
         for i in range(4):

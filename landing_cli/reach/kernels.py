@@ -1,11 +1,31 @@
-"""Whether the compiled kernels are in the cache."""
+"""The compiled kernels: whether they are in the cache, and their first compilation.
+
+Most of a compilation is numba's own work in Python, which threads cannot share. Forked copies of the process
+can: each compiles a part, and what it leaves in the cache on disk is linked, not compiled, by the next.
+"""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
+from landing_cli.body.adjacency import mean_edge_m
+from landing_cli.body.bvh import build_surface_index
+from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.compile_cache import is_cached
-from landing_cli.reach.free_batch import solve_many
+from landing_cli.optimize.conic_ipm import advance, residuals
+from landing_cli.parallel.forks import share_out
+from landing_cli.reach.certificate import GravityBounds, certified_thrust_level, linearised_thrust_level
+from landing_cli.reach.delivery import deliver_many, new_deliveries
+from landing_cli.reach.descent_model import layout, refresh
+from landing_cli.reach.ellipsoid_arcs import arc_cuts_many, freeze_many, lowest_levels, lowest_levels_between
+from landing_cli.reach.free_batch import no_cuts, solve_many
+from landing_cli.reach.free_descent import PreparedCase, Surroundings, prepare, survey
+from landing_cli.reach.free_solve import Solver, cold_start, new_solver
+from landing_cli.reach.records import LandingCase
 
 
 def are_compiled(descent: str) -> bool:
@@ -22,3 +42,89 @@ def are_compiled(descent: str) -> bool:
 
         kernels.append(search_batch)
     return all(is_cached(kernel) for kernel in kernels)
+
+
+def compile_parts(case: LandingCase) -> None:
+    """Compile, on all processors, what the kernels of a case are made of.
+
+    The parts are called with numbers of no meaning, once. What joins them compiles when a facet is solved.
+
+    Parameters
+    ----------
+    case : LandingCase
+        Any case of the run.
+    """
+    mesh = case.asteroid.mesh
+    unbound = GravityBounds(np.array([1.0]), np.array([1.0]), 1.0)  # spares the survey, which is a part
+    shared = Surroundings(
+        build_surface_index(mesh), facet_centroids(mesh), facet_normals(mesh), mean_edge_m(mesh), unbound
+    )
+    prepared = prepare(case, shared)
+    parts = [_conic, _flight, _delivery, lambda _: survey(case), _ellipsoid_arcs]
+    if case.descent == "extremal":
+        parts.insert(0, _extremals)
+    with np.errstate(all="ignore"):
+        share_out([_bound(part, prepared) for part in parts], len(os.sched_getaffinity(0)))
+
+
+def _bound(part: Callable[[PreparedCase], object], prepared: PreparedCase) -> Callable[[], object]:
+    return lambda: part(prepared)
+
+
+def _solver(prepared: PreparedCase) -> Solver:
+    return new_solver(prepared.coarse)
+
+
+def _conic(prepared: PreparedCase) -> None:
+    """Interior-point iterations and certificates."""
+    solver, case = _solver(prepared), prepared.coarse
+    point, model, step = solver.point, solver.model, solver.step
+    rows, cones, target = model.row_value.shape[0], model.cone_offset.shape[0], np.ones(3)
+    plan = layout(case, 0, 1.0, False, 1.0)
+    advance(point, model, step, 6, rows, cones, 1.0, 1e-9, False)
+    residuals(point, model, step, 6, rows, cones, False)
+    linearised_thrust_level(case, plan, point, model, solver.duals)
+    certified_thrust_level(
+        case, target, prepared.coarse_tube, 1.0, model, point.multiplier, point.cone_dual, solver.duals
+    )
+
+
+def _flight(prepared: PreparedCase) -> None:
+    """The linearised flight, gravity and constraints."""
+    case, solver, normal = prepared.coarse, _solver(prepared), prepared.shared.normals[0]
+    plan = layout(case, 0, 1.0, False, 1.0)
+    cold_start(case, normal, normal, plan, solver)
+    refresh(case, normal, plan, solver.cuts, False, solver.point, solver.path, solver.model)
+
+
+def _delivery(prepared: PreparedCase) -> None:
+    """The accurate flight and its measures."""
+    shared, first = prepared.shared, slice(0, 1)
+    thrust = np.zeros((1, len(prepared.coarse.mid_cos), 3))
+    deliver_many(
+        prepared.coarse,
+        prepared.frame,
+        shared.surface,
+        thrust,
+        shared.centroids_m[first],
+        shared.normals[first],
+        new_deliveries(1),
+    )
+
+
+def _ellipsoid_arcs(prepared: PreparedCase) -> None:
+    """Tangent planes along arcs and paths."""
+    case = prepared.coarse
+    n = len(case.mid_cos)
+    position, cuts, out = np.ones((1, n + 1, 3)), no_cuts(1, n), np.empty(1)
+    lowest_levels(case, position, out)
+    lowest_levels_between(case, np.zeros((1, n, 3)), out)
+    arc_cuts_many(case, position, 1.0, cuts)
+    freeze_many(case, position, out, cuts)
+
+
+def _extremals(prepared: PreparedCase) -> None:
+    """The paper's extremals."""
+    from landing_cli.reach.extremal_descent import solve_prepared
+
+    solve_prepared(prepared, np.zeros(1, dtype=np.int64))

@@ -23,7 +23,7 @@ from landing_cli.reach.facet_work import (
     solve_items,
 )
 from landing_cli.reach.free_descent import PreparedCase, prepare, survey
-from landing_cli.reach.kernels import are_compiled
+from landing_cli.reach.kernels import are_compiled, compile_parts
 from landing_cli.reach.recorded import solve_recorded
 from landing_cli.reach.records import FacetSolutions, LandingCase, Verdict, join
 from landing_cli.reach.stored import CaseResult, ReachRun, run_from_result, run_to_tree
@@ -129,9 +129,12 @@ def run(
         return Outcome(run_from_result(read(output)), up_to_date=True)
     with journal:
         cases = landing_cases(reach, built)
-        prepared = _prepare(cases)
-        if not are_compiled(reach.descent):
+        compiled = are_compiled(reach.descent)
+        if not compiled:
             say(COMPILING)
+            compile_parts(cases[0][1])
+        prepared = _prepare(cases)
+        if not compiled:
             _compile(prepared)
         found = ReachRun(_solve(reach, cases, prepared, journal, options, progress))
         taken = {"jobs": options.plan.jobs, "backend": options.plan.backend, "resumed": int(options.resume)}
