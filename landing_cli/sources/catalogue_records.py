@@ -1,28 +1,29 @@
-"""A catalogue of asteroids as it was read: elements, magnitudes, and the rows that were no use."""
+"""A list of minor planets as it was read: arrays, the file it came from, and the rows it could not use."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+import numpy.typing as npt
 
 from landing_cli.flight.elements import OrbitElements
 
-FloatArray = NDArray[np.float64]
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 UNKNOWN_CONDITION = -1
-"""Condition code of an orbit whose source gives none."""
 
 
 @dataclass(frozen=True)
 class BadRow:
-    """A row that was left out.
+    """A row that was skipped.
 
     Attributes
     ----------
     line : int
-        1-based line of the file; of a JSON list, the 1-based entry.
+        Line of the (unpacked) file, from 1; of a JSON file the entry of its list, from 1.
     reason : str
         What is wrong with it.
     """
@@ -33,36 +34,60 @@ class BadRow:
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:
-    """Asteroids and their orbits, in the order of their source.
+    """Minor planets with their osculating orbits.
 
     Attributes
     ----------
     designations : tuple of str
-        Unpacked: ``12923``, ``2018 QE``.
+        Unpacked: the number where there is one (``154276``), else the provisional one (``2014 FR37``).
     elements : OrbitElements
-        Osculating heliocentric elements, ecliptic and equinox J2000, each at its own epoch; (n,) arrays.
+        n rows, heliocentric, ecliptic and equinox J2000, each at its own epoch.
     absolute_magnitude : (n,) float
-        H; NaN where the source gives none.
+        H; NaN where the catalogue gives none.
     condition_code : (n,) int
-        The MPC's U (0 best to 9), `UNKNOWN_CONDITION` where the source gives none.
+        Uncertainty U, 0 (best) to 9; -1 where the catalogue gives none.
     numbered : (n,) bool
-        Whether the orbit has a permanent number.
     source : str
-        Name of the file that was read, for people.
+        Name of the file.
     sha256 : str
-        Of the bytes that were read.
+        Of the file as it lies on the disk.
     bad_rows : tuple of BadRow
-        Rows that were left out, and why.
+        What was skipped and why, in the order of the file.
     """
 
     designations: tuple[str, ...]
     elements: OrbitElements
     absolute_magnitude: FloatArray
-    condition_code: NDArray[np.int64]
-    numbered: NDArray[np.bool_]
+    condition_code: IntArray
+    numbered: BoolArray
     source: str
     sha256: str
     bad_rows: tuple[BadRow, ...] = ()
 
     def __len__(self) -> int:
+        """Objects in the catalogue."""
         return len(self.designations)
+
+    def take(self, indices: IntArray) -> Catalogue:
+        """Choose objects.
+
+        Parameters
+        ----------
+        indices : (m,) int
+            Rows to keep, in the order wanted.
+
+        Returns
+        -------
+        Catalogue
+            m objects of the same source.
+        """
+        return Catalogue(
+            tuple(self.designations[i] for i in indices),
+            self.elements.rows(indices),
+            self.absolute_magnitude[indices],
+            self.condition_code[indices],
+            self.numbered[indices],
+            self.source,
+            self.sha256,
+            self.bad_rows,
+        )
