@@ -120,12 +120,6 @@ class TargetsSection(Section):
     exclude: tuple[Designation, ...] = Field(
         default=(), max_length=1000, description="designations left out: [2014 NQ64]"
     )
-    epoch_distance_max_d: float = Field(
-        default=4000.0,
-        gt=0,
-        le=40_000,
-        description="farthest that the epoch of elements may be from the flight, d; beyond it is refused",
-    )
     albedo: float = Field(
         default=0.15,
         gt=0,
@@ -237,7 +231,7 @@ class TourSection(Section):
         default="liu2023",
         min_length=1,
         max_length=1000,
-        description="liu2023 (nine of the paper's asteroids, shipped), or a file: MPCORB, MPC JSON, SBDB CSV",
+        description="liu2023 (the paper's ten asteroids, shipped), or a file: MPCORB, MPC JSON, SBDB CSV",
     )
     ephemeris: Literal["de440"] = Field(default="de440", description="planets, Earth and Moon: de440")
     departure: DepartureSection = Field(description="state from which the spacecraft sets out")

@@ -1,0 +1,118 @@
+"""What a stored run of `tour` holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from landing_cli.sources.catalogue_records import Catalogue
+from landing_cli.tour.records import Departure, DepthReport, FlybyChain, SearchLimits, SearchMethod
+
+FloatArray = NDArray[np.float64]
+
+RunKind = Literal["search", "compare"]
+
+
+@dataclass(frozen=True, eq=False)
+class ChainPath:
+    """The N-body flight of a chain, sampled; a burn stands between two arcs, and its time in both.
+
+    Attributes
+    ----------
+    t_s : (n,) float, s
+        TDB seconds past J2000.
+    position_m, velocity_m_s : (n, 3) float, m and m/s
+        Heliocentric, ecliptic and equinox J2000.
+    arc : (n,) int
+        Which coast a sample belongs to: 0 before the first burn, i after burn i.
+    """
+
+    t_s: FloatArray
+    position_m: FloatArray
+    velocity_m_s: FloatArray
+    arc: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class TourFacts:
+    """What all chains of a run share.
+
+    Attributes
+    ----------
+    name : str
+        Of the scenario.
+    kind : {"search", "compare"}
+    method : {"beam", "layered"}
+        How chains were searched.
+    departure : Departure
+    limits : SearchLimits
+    albedo : float
+        Assumed for sizes.
+    ephemeris : str
+        Kernel that the planets' positions come from.
+    targets : Catalogue
+        The asteroids that the chains pass; legs count its rows.
+    catalogue_rows, catalogue_bad_rows, searched_targets : int
+        Rows read, rows left out as bad, and asteroids that were searched.
+    """
+
+    name: str
+    kind: RunKind
+    method: SearchMethod
+    departure: Departure
+    limits: SearchLimits
+    albedo: float
+    ephemeris: str
+    targets: Catalogue
+    catalogue_rows: int
+    catalogue_bad_rows: int
+    searched_targets: int
+
+
+@dataclass(frozen=True, eq=False)
+class ChainEntry:
+    """One chain of a run.
+
+    Attributes
+    ----------
+    name : str
+        ``chain_01``, best first; in a comparison ``scheme_02``.
+    chain : FlybyChain
+    path : ChainPath or None
+        None where no flight was found.
+    facts : TourFacts
+    """
+
+    name: str
+    chain: FlybyChain
+    path: ChainPath | None
+    facts: TourFacts
+
+
+@dataclass(frozen=True, eq=False)
+class TourRun:
+    """Chains of flybys, best first.
+
+    Attributes
+    ----------
+    cases : tuple of ChainEntry
+        Those that were flown in N-body; after them those that broke.
+    facts : TourFacts
+    depths : tuple of DepthReport
+        How far the search looked.
+    nearest : FlybyChain or None
+        Where the search found no chain within the limits: the one that came nearest.
+    """
+
+    cases: tuple[ChainEntry, ...]
+    facts: TourFacts
+    depths: tuple[DepthReport, ...]
+    nearest: FlybyChain | None
+
+    @property
+    def flown(self) -> tuple[ChainEntry, ...]:
+        """The chains that hold in N-body."""
+        return tuple(entry for entry in self.cases if entry.chain.status == "flown")
