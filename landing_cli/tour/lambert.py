@@ -1,7 +1,7 @@
 """Lambert's problem with any number of revolutions: Izzo 2015, "Revisiting Lambert's problem".
 
-The unknown is x of Lancaster and Blanchard (x = 1 on the parabola, x < 1 on ellipses); Householder's third-order
-iteration finds it from Izzo's starting values. Departures from the paper, all for the sake of the last digits:
+The unknown is x of Lancaster and Blanchard (x = 1 on the parabola, x < 1 on ellipses); Householder's
+third-order iteration finds it from Izzo's starting values, held in a bracket. Departures from the paper:
 
 - lambda and sigma come from half the transfer angle, not from differences of sides, so that arcs near 180
   degrees lose no more than the plane itself does (1/sin of the angle);
