@@ -233,7 +233,12 @@ class TourSection(Section):
         max_length=1000,
         description="liu2023 (the paper's ten asteroids, shipped), or a file: MPCORB, MPC JSON, SBDB CSV",
     )
-    ephemeris: Literal["de440"] = Field(default="de440", description="planets, Earth and Moon: de440")
+    ephemeris: str = Field(
+        default="DE440",
+        min_length=1,
+        max_length=1000,
+        description="planets, Earth and Moon: DE440 (of the extra tour), or a planetary SPK file (.bsp)",
+    )
     departure: DepartureSection = Field(description="state from which the spacecraft sets out")
     targets: TargetsSection = Field(default=TargetsSection(), description="which asteroids are targets")
     limits: LimitsSection = Field(description="what every chain of flybys keeps to")

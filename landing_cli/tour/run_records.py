@@ -84,12 +84,16 @@ class ChainEntry:
     path : ChainPath or None
         None where no flight was found.
     facts : TourFacts
+    day_distance_m : (k, 2) float, m, or None
+        In a comparison: least and greatest distance of each asteroid from the Earth on the day that the
+        paper prints for its flyby.
     """
 
     name: str
     chain: FlybyChain
     path: ChainPath | None
     facts: TourFacts
+    day_distance_m: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,20 +103,18 @@ class TourRun:
     Attributes
     ----------
     cases : tuple of ChainEntry
-        Those that were flown in N-body; after them those that broke.
+        Of a search, those that hold in N-body; of a comparison, all schemes.
     facts : TourFacts
     depths : tuple of DepthReport
         How far the search looked.
     nearest : FlybyChain or None
-        Where the search found no chain within the limits: the one that came nearest.
+        Where no chain keeps to the limits: the one that came nearest.
+    broken : tuple of FlybyChain
+        Chains of a search that do not hold in N-body.
     """
 
     cases: tuple[ChainEntry, ...]
     facts: TourFacts
     depths: tuple[DepthReport, ...]
     nearest: FlybyChain | None
-
-    @property
-    def flown(self) -> tuple[ChainEntry, ...]:
-        """The chains that hold in N-body."""
-        return tuple(entry for entry in self.cases if entry.chain.status == "flown")
+    broken: tuple[FlybyChain, ...] = ()
