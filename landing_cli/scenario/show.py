@@ -36,6 +36,21 @@ def to_yaml(scenario: AnyScenario, header: str = "") -> str:
     return "\n".join([*lines, *_section(scenario, "")]) + "\n"
 
 
+def section_to_yaml(section: BaseModel) -> str:
+    """Write one section of a scenario as YAML.
+
+    Parameters
+    ----------
+    section : BaseModel
+        What to write.
+
+    Returns
+    -------
+    str
+    """
+    return "\n".join(_section(section, "")) + "\n"
+
+
 def _section(section: BaseModel, indent: str) -> Iterator[str]:
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)

@@ -18,6 +18,9 @@ class EscapeMap:
     ----------
     name : str
         ``moon`` or ``earth``.
+    gm_m3_s2 : float, m3/s2
+    radius_m : float, m
+        Of the body, from which altitudes count.
     periapsis_altitude_m : (n,) float, m
     apoapsis_altitude_m : (m,) float, m
     delta_v_m_s : (n, m) float, m/s
@@ -25,6 +28,8 @@ class EscapeMap:
     """
 
     name: str
+    gm_m3_s2: float
+    radius_m: float
     periapsis_altitude_m: FloatArray
     apoapsis_altitude_m: FloatArray
     delta_v_m_s: FloatArray

@@ -77,7 +77,7 @@ def _map_to_group(entry: EscapeMap, order: int) -> Group:
             ("periapsis_altitude_m", "apoapsis_altitude_m"),
         ),
     }
-    return Group(members, {"order": order})
+    return Group(members, {"order": order, "gm_m3_s2": entry.gm_m3_s2, "radius_m": entry.radius_m})
 
 
 def _map_from_group(name: str, group: Group) -> EscapeMap:
@@ -86,4 +86,4 @@ def _map_from_group(name: str, group: Group) -> EscapeMap:
     )
     if found.shape != (len(low), len(high)) or any(x.dtype != np.float64 for x in (low, high, found)):
         raise ValueError(f"the map of {name} has the shape {found.shape}")
-    return EscapeMap(name, low, high, found)
+    return EscapeMap(name, number(group, "gm_m3_s2"), number(group, "radius_m"), low, high, found)
