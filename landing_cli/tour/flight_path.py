@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.flight.astronomy import DAY_S
-from landing_cli.tour.ephemeris import Ephemeris
+from landing_cli.tour.ephemeris import Ephemeris, states_of_body
 from landing_cli.tour.nbody import FlightStatus, fly_through
 from landing_cli.tour.records import Departure, Leg
 from landing_cli.tour.run_records import ChainPath
@@ -53,11 +53,13 @@ def sampled_path(departure: Departure, legs: Sequence[Leg], ephemeris: Ephemeris
             return None
         parts.append((times, np.vstack([state, states]), np.full(len(times), arc)))
         state = states[-1]
+    times = np.concatenate([part[0] for part in parts])
     states = np.vstack([part[1] for part in parts])
     return ChainPath(
-        np.concatenate([part[0] for part in parts]),
+        times,
         np.ascontiguousarray(states[:, :3]),
         np.ascontiguousarray(states[:, 3:]),
+        np.ascontiguousarray(states_of_body(ephemeris, "Earth", times)[:, :3]),
         np.concatenate([part[2] for part in parts]),
     )
 

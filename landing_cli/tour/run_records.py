@@ -26,6 +26,8 @@ class ChainPath:
         TDB seconds past J2000.
     position_m, velocity_m_s : (n, 3) float, m and m/s
         Heliocentric, ecliptic and equinox J2000.
+    earth_m : (n, 3) float, m
+        The Earth, in the same axes.
     arc : (n,) int
         Which coast a sample belongs to: 0 before the first burn, i after burn i.
     """
@@ -33,6 +35,7 @@ class ChainPath:
     t_s: FloatArray
     position_m: FloatArray
     velocity_m_s: FloatArray
+    earth_m: FloatArray
     arc: NDArray[np.int64]
 
 

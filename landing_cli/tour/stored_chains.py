@@ -37,6 +37,7 @@ PATH_COLUMNS = (
     Column("t_s", "f8", "s", "TDB past J2000"),
     Column("position_m", "f8", "m", "spacecraft, heliocentric, ecliptic and equinox J2000", (3,)),
     Column("velocity_m_s", "f8", "m s-1", "spacecraft, heliocentric, ecliptic and equinox J2000", (3,)),
+    Column("earth_m", "f8", "m", "the Earth, heliocentric, ecliptic and equinox J2000", (3,)),
     Column("arc", "i8", "1", "coast: 0 before the first burn, i after burn i"),
 )
 DEPTH_COLUMNS = (

@@ -1,8 +1,8 @@
 """Whether stored chains of flybys do what they say: flown again by another integrator and ephemeris.
 
 Spacecraft and asteroids are flown by scipy's DOP853, with positions that jplephem evaluates straight from
-the kernel, in ICRF axes: neither the integrator, nor the pieces of the ephemeris, nor the frame is that of the
-search and its re-flight. What cannot be true in a record is a fault before anything flies.
+the kernel, in ICRF axes: neither the integrator, nor the pieces of the ephemeris, nor the frame is that of
+the search and its re-flight. What cannot be true in a record is a fault before anything flies.
 """
 
 from __future__ import annotations
