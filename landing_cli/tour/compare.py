@@ -169,8 +169,7 @@ def _over_day(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Hours of the printed day, and an asteroid's states and distances from the Earth then."""
     times: FloatArray = utc_to_t_s(printed.date) + HOURS * (DAY_S / 24.0)
-    start = fly_elements(targets.elements.rows([row]), times[0], ephemeris)[0]
-    states = fly(start, times[0], times, ephemeris)[0]
+    states = fly_elements(targets.elements.rows([row]), times, ephemeris)[0]
     earth = states_of_body(ephemeris, "Earth", times)
     distances: FloatArray = np.linalg.norm(states[:, :3] - earth[:, :3], axis=1)
     return times, states, distances

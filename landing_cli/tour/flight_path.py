@@ -48,9 +48,10 @@ def sampled_path(departure: Departure, legs: Sequence[Leg], ephemeris: Ephemeris
             continue  # the first burn may come at once
         inner = [leg.arrival_t_s for leg in legs if start < leg.arrival_t_s < end]
         times = _times(start, end, inner)
-        states, status = fly_through(state, start, times[1:], ephemeris)
-        if status is not FlightStatus.ARRIVED:
+        flown, status = fly_through(state, start, times[1:], ephemeris)
+        if status[0] != FlightStatus.ARRIVED:
             return None
+        states = flown[0]
         parts.append((times, np.vstack([state, states]), np.full(len(times), arc)))
         state = states[-1]
     times = np.concatenate([part[0] for part in parts])

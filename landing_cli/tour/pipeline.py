@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -211,7 +212,8 @@ def _fly_schemes(
 ) -> tuple[TourRun, dict[str, str]]:
     names, wanted = scheme_hints(case)
     targets, hints = used_targets(wanted, case.targets)
-    found, lost = _flown(replace(case, targets=targets), hints, journal, plan, progress)
+    unbound = replace(case.limits, delta_v_m_s=math.inf, end_t_s=math.inf, geocentric_distance_m=math.inf)
+    found, lost = _flown(replace(case, targets=targets, limits=unbound), hints, journal, plan, progress)
     facts = case.facts("compare", targets)
     entries = tuple(
         ChainEntry(name, chain, path, facts, day_distances(name, chain, targets, case.ephemeris))

@@ -27,19 +27,19 @@ from landing_cli.tour.targets import diameter_m
 
 FloatArray = NDArray[np.float64]
 
-RELATIVE_TOLERANCE = 1e-12
-ABSOLUTE_TOLERANCE = np.repeat([1.0, 1e-7], 3)  # m, m/s
+RELATIVE_TOLERANCE = 3e-14
+ABSOLUTE_TOLERANCE = np.repeat([1e-3, 1e-10], 3)  # m, m/s
 
 # What a flight may miss or differ by at most.
 LIMITS: Mapping[str, float] = {
-    "miss_m": 1000.0,  # of spacecraft and asteroid, both flown again
-    "stored_path_m": 1000.0,
-    "stored_speed_m_s": 1e-3,
-    "stored_phase_angle_rad": 1e-6,
-    "stored_geocentric_distance_m": 1000.0,
+    "miss_m": 200.0,  # of spacecraft and asteroid, both flown again
+    "stored_path_m": 100.0,
+    "stored_speed_m_s": 1e-4,
+    "stored_phase_angle_rad": 1e-8,
+    "stored_geocentric_distance_m": 100.0,
     "delta_v_excess_m_s": 1e-6,  # over the limit of the search
     "late_s": 1e-3,  # after the last date
-    "geocentric_distance_excess_m": 1000.0,
+    "geocentric_distance_excess_m": 100.0,
 }
 SEARCH_ONLY = ("delta_v_excess_m_s", "late_s", "geocentric_distance_excess_m")
 

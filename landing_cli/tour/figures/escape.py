@@ -40,7 +40,8 @@ def escape_figure(entry: EscapeMap, flights: Sequence[EscapeFlight]) -> Figure:
     levels = _levels(float(np.nanmin(found)), float(np.nanmax(found)))
     axes.contourf(x, y, values, levels=levels, cmap=plotting.delta_v_colours(), extend="both", alpha=0.85)
     lines = axes.contour(x, y, values, levels=levels, colors=plotting.INK, linewidths=0.7)
-    axes.clabel(lines, fmt="%g", fontsize=8)
+    for label in axes.clabel(lines, fmt="%g", fontsize=8):
+        label.set_fontfamily("DejaVu Sans")
     if entry.name == "earth":
         for flight in flights:
             place = flight.perigee_altitude_m / 1e6, flight.apogee_altitude_m / 1e6
