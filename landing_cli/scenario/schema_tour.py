@@ -156,8 +156,8 @@ class BeamSection(Section):
         max_length=100,
         description="waiting times between a flyby and the next burn that are tried, d",
     )
-    near_km: Kilometres = Field(
-        default=3e7, description="an asteroid is tried where the coast passes it within this distance, km"
+    branches: int = Field(
+        default=60, ge=1, le=10_000, description="next targets that are solved exactly from each partial chain"
     )
     kept_chains: int = Field(
         default=40, ge=1, le=10_000, description="chains, best first, that are flown again in N-body"

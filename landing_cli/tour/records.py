@@ -105,8 +105,8 @@ class BeamOptions:
         Grid of arrival times.
     waits_s : tuple of float, s
         Waiting times between a flyby and the next burn that are tried.
-    near_m : float, m
-        Coast distance within which an asteroid is tried as the next target.
+    branches : int
+        Next targets that are tried from each partial chain.
     kept_chains : int
         Chains handed on to the re-flight.
     """
@@ -114,7 +114,7 @@ class BeamOptions:
     beam: int
     time_step_s: float
     waits_s: tuple[float, ...]
-    near_m: float
+    branches: int
     kept_chains: int
 
 
@@ -130,6 +130,8 @@ class LayeredOptions:
         Targets kept by each criterion of the first, second and third selection.
     time_step_s : float, s
         Grid of arrival times of the transfer design.
+    kept_chains : int
+        Chains handed on to the re-flight.
     """
 
     distance_m: float
@@ -137,6 +139,7 @@ class LayeredOptions:
     k2: int
     k3: int
     time_step_s: float
+    kept_chains: int
 
 
 @dataclass(frozen=True, eq=False)
