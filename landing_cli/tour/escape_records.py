@@ -37,7 +37,7 @@ class EscapeMap:
 
 @dataclass(frozen=True)
 class EscapeFlight:
-    """One orbit about the Earth, left in N-body.
+    """One orbit about the Earth, flown in N-body to where the paper takes a craft for free.
 
     Attributes
     ----------
@@ -46,18 +46,27 @@ class EscapeFlight:
     perigee_altitude_m, apogee_altitude_m : float, m
         Of the osculating orbit at the perigee.
     two_body_m_s : float, m/s
-        Increment at the perigee that eq 2 asks for.
-    flown_m_s : float, m/s
-        Least increment at the perigee with which the flight in N-body gets away; NaN where none does.
+        Increment at the perigee that eq 2 asks for: to infinity.
+    two_body_reach_m_s : float, m/s
+        Two-body increment at the perigee that carries to 1.5 million km.
+    flown_m_s, flown_least_m_s, flown_most_m_s : float, m/s
+        Least increment at the perigee with which a flight in N-body gets to 1.5 million km: median, least and
+        most over epochs and directions; NaN where none does.
+    flown_apogee_m : float, m
+        Greatest distance from the Earth's centre without a burn, median.
     told : str
-        Epoch, orientation and end of the flight, in words.
+        Epochs, directions and forces, in words.
     """
 
     name: str
     perigee_altitude_m: float
     apogee_altitude_m: float
     two_body_m_s: float
+    two_body_reach_m_s: float
     flown_m_s: float
+    flown_least_m_s: float
+    flown_most_m_s: float
+    flown_apogee_m: float
     told: str
 
 

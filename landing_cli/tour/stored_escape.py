@@ -9,7 +9,16 @@ from landing_cli.results.tree import Dataset, Group
 from landing_cli.tour.escape_records import EscapeFlight, EscapeMap, EscapeRun
 from landing_cli.tour.stored_words import text
 
-_NUMBERS = ("perigee_altitude_m", "apogee_altitude_m", "two_body_m_s", "flown_m_s")
+_NUMBERS = (
+    "perigee_altitude_m",
+    "apogee_altitude_m",
+    "two_body_m_s",
+    "two_body_reach_m_s",
+    "flown_m_s",
+    "flown_least_m_s",
+    "flown_most_m_s",
+    "flown_apogee_m",
+)
 
 
 def escape_to_members(run: EscapeRun) -> dict[str, Dataset | Group]:
