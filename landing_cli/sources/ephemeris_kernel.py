@@ -69,7 +69,7 @@ def read_span(kernel: str, start_t_s: float, end_t_s: float, nodes: int = 14) ->
     InputRefused
         If the extra is missing, the file is no planetary kernel, or the span is outside it.
     """
-    with _opened(kernel) as (spk, name):
+    with opened_kernel(kernel) as (spk, name):
         segments = {pair: _segment(spk, pair, name) for pair in _NEEDED}
         _check_cover(segments.values(), start_t_s, end_t_s, name)
         edges = _edges(segments.values(), start_t_s, end_t_s, name)
@@ -79,8 +79,24 @@ def read_span(kernel: str, start_t_s: float, end_t_s: float, nodes: int = 14) ->
 
 
 @contextmanager
-def _opened(kernel: str) -> Iterator[tuple[Any, str]]:
-    """An open SPK file, and its name."""
+def opened_kernel(kernel: str) -> Iterator[tuple[Any, str]]:
+    """Open a kernel for reading.
+
+    Parameters
+    ----------
+    kernel : str
+        ``DE440``, or the path of an SPK file.
+
+    Yields
+    ------
+    tuple of jplephem's SPK and str
+        The open file, and its name for people.
+
+    Raises
+    ------
+    InputRefused
+        If the extra is missing, or the file is no SPK kernel.
+    """
     try:
         from jplephem.spk import SPK
     except ImportError as error:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.sources.ephemeris_kernel import EARTH, EARTH_MOON, MOON, SUN, _opened, _segment
+from landing_cli.sources.ephemeris_kernel import EARTH, EARTH_MOON, MOON, SUN, opened_kernel, _segment
 
 FloatArray = NDArray[np.float64]
 Points = Callable[[float], FloatArray]
@@ -43,7 +43,7 @@ def heliocentric_points(kernel: str) -> Iterator[Points]:
     InputRefused
         If the extra is missing, or the file is no planetary kernel.
     """
-    with _opened(kernel) as (spk, name):
+    with opened_kernel(kernel) as (spk, name):
         sun, pair, *planets = (
             _Series(_segment(spk, (0, number), name)) for number in (SUN, EARTH_MOON, *_BARYCENTRES)
         )

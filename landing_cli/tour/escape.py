@@ -87,7 +87,7 @@ def fly_escapes(kernel_name: str) -> tuple[EscapeFlight, ...]:
     """
     start, end = (utc_to_t_s(text) for text in ESCAPE_SPAN)
     ephemeris = flight_ephemeris(kernel_name, start, end)
-    epochs: FloatArray = start + _MONTH_S / _EPOCHS * np.arange(_EPOCHS)
+    epochs = np.linspace(start, start + _MONTH_S, _EPOCHS, endpoint=False)
     axis = (GM_M3_S2["Earth"] * (_PERIOD_S / (2.0 * math.pi)) ** 2) ** (1.0 / 3.0)
     return (
         escape_flight("perigee_100_km", 1.0e5, 1.5e9, epochs, ephemeris),
