@@ -125,6 +125,9 @@ def correct_legs(
             message = f"{told}the asteroid itself does not get there (it hits the Earth or the Moon)"
             break
         shot = shoot(before[0], leg.burn_t_s, leg.arrival_t_s, asteroid[:3], leg.delta_v_m_s, ephemeris)
+        if not shot.met:  # a conic out of the Earth's reach may mislead; the coast is another start
+            again = shoot(before[0], leg.burn_t_s, leg.arrival_t_s, asteroid[:3], np.zeros(3), ephemeris)
+            shot = again if again.met else shot
         if not shot.met:
             message = told + shot.message
             break
