@@ -420,6 +420,7 @@ def _print_escape(run: EscapeRun, path: Path, as_json: bool) -> None:
         console.print_text("")
         columns = [key for key in flights[0] if key != "told"]
         console.print_table(columns, [[row[key] for key in columns] for row in flights])
+        console.print_text("\n" + "\n".join(told["notes"]))
 
 
 def _judge(outcome: Outcome, path: Path, voice: console.Console) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.sources.ephemeris_kernel import EARTH, EARTH_MOON, MOON, SUN, opened_kernel, _segment
+from landing_cli.sources.ephemeris_kernel import EARTH, EARTH_MOON, MOON, SUN, _segment, opened_kernel
 
 FloatArray = NDArray[np.float64]
 Points = Callable[[float], FloatArray]

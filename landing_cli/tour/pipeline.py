@@ -23,7 +23,7 @@ from landing_cli.results.store import read
 from landing_cli.scenario.load import LoadedTour
 from landing_cli.scenario.show import to_yaml
 from landing_cli.tour.cases import TourCase
-from landing_cli.tour.compare import day_distances, scheme_hints
+from landing_cli.tour.compare import printed_days, schemes_of
 from landing_cli.tour.escape_records import EscapeRun
 from landing_cli.tour.flight_path import sampled_path
 from landing_cli.tour.nbody import fly_batch
@@ -34,6 +34,7 @@ from landing_cli.tour.recorded import (
     outcome_to_arrays,
 )
 from landing_cli.tour.records import BeamOptions, DepthReport, FlybyChain, SearchOutcome
+from landing_cli.tour.redating import improve_dates
 from landing_cli.tour.reflight import refly
 from landing_cli.tour.run_records import ChainEntry, ChainPath, TourRun
 from landing_cli.tour.stored import MISSION, run_from_result, run_to_tree, used_targets
@@ -42,6 +43,7 @@ from landing_cli.tour.summary import best_first
 COMPILING = "compiling the kernels (once after an installation; about half a minute)"
 SEARCHED = "search"
 
+Windows = Sequence[tuple[float, float]]
 Found = tuple[FlybyChain, ChainPath | None]
 
 
@@ -210,26 +212,24 @@ def _nearest(
 def _fly_schemes(
     case: TourCase, journal: Journal, plan: WorkPlan, progress: Callable[[int, int], None]
 ) -> tuple[TourRun, dict[str, str]]:
-    names, wanted = scheme_hints(case)
-    targets, hints = used_targets(wanted, case.targets)
+    schemes = schemes_of(case)
+    targets, hints = used_targets([scheme.hint for scheme in schemes], case.targets)
     unbound = replace(case.limits, delta_v_m_s=math.inf, end_t_s=math.inf, geocentric_distance_m=math.inf)
-    found, lost = _flown(replace(case, targets=targets, limits=unbound), hints, journal, plan, progress)
+    asked = replace(case, targets=targets, limits=unbound)
+    windows = [scheme.windows for scheme in schemes]
+    found, lost = _flown(asked, hints, journal, plan, progress, windows)
     facts = case.facts("compare", targets)
     entries = tuple(
-        ChainEntry(name, chain, path, facts, day_distances(name, chain, targets, case.ephemeris))
-        for name, (chain, path) in zip(names, found, strict=not lost)
+        ChainEntry(scheme.name, chain, path, facts, scheme.model)
+        for scheme, (chain, path) in zip(schemes, found, strict=not lost)
     )
-    return TourRun(entries, facts, (), None), lost
+    return TourRun(entries, facts, (), None, days=printed_days(case)), lost
 
 
 def _searched(case: TourCase, journal: Journal, plan: WorkPlan, say: Callable[[str], None]) -> SearchOutcome:
     """Search, or take over what the journal holds of an earlier search."""
     if SEARCHED in journal.records:
         return outcome_from_arrays(journal.records[SEARCHED])
-    if isinstance(case.options, BeamOptions):
-        from landing_cli.tour.beam_search import search
-    else:
-        from landing_cli.tour.layered_search import search  # type: ignore[assignment]
 
     def told(depth: DepthReport) -> None:
         say(depth_line(depth))
@@ -238,9 +238,15 @@ def _searched(case: TourCase, journal: Journal, plan: WorkPlan, say: Callable[[s
         with closing(run_chunks(work, chunks, plan)) as answers:
             yield from answers
 
-    outcome = search(
-        case.targets, case.departure, case.limits, case.options, case.ephemeris, run=run, progress=told
-    )
+    asked, options = (case.targets, case.departure, case.limits), case.options
+    if isinstance(options, BeamOptions):
+        from landing_cli.tour.beam_search import search as search_beam
+
+        outcome = search_beam(*asked, options, case.ephemeris, run=run, progress=told)
+    else:
+        from landing_cli.tour.layered_search import search as search_layers
+
+        outcome = search_layers(*asked, options, case.ephemeris, run=run, progress=told)
     journal.append(SEARCHED, outcome_to_arrays(outcome))
     return outcome_from_arrays(outcome_to_arrays(outcome))
 
@@ -266,13 +272,15 @@ def _flown(
     journal: Journal,
     plan: WorkPlan,
     progress: Callable[[int, int], None],
+    windows: Sequence[Windows] | None = None,
 ) -> tuple[list[Found], dict[str, str]]:
     """Fly chains, each recorded as it comes; take over those that the journal holds."""
     flown = {int(key): chain_from_arrays(a) for key, a in journal.records.items() if key != SEARCHED}
     progress(len(flown), len(hints))
     left = [[index] for index in range(len(hints)) if index not in flown]
     lost: dict[str, str] = {}
-    work = partial(fly_chains, hints, replace(case, catalogue=case.targets))  # the full one is not sent
+    reduced = replace(case, catalogue=case.targets)  # the full one is not sent
+    work = partial(fly_chains, hints, reduced, windows)
     with closing(run_chunks(work, left, plan)) as answers:
         for _, answer in answers:
             if isinstance(answer, LostChunk):
@@ -286,9 +294,9 @@ def _flown(
 
 
 def fly_chains(
-    hints: Sequence[FlybyChain], case: TourCase, indices: Sequence[int]
+    hints: Sequence[FlybyChain], case: TourCase, windows: Sequence[Windows] | None, indices: Sequence[int]
 ) -> list[tuple[int, dict[str, Any]]]:
-    """Fly some chains in N-body.
+    """Fly some chains in N-body, and move their dates to where they ask for less.
 
     Parameters
     ----------
@@ -296,6 +304,8 @@ def fly_chains(
         All of them.
     case : TourCase
         What was asked.
+    windows : sequence of sequences of (float, float), s, or None
+        Earliest and latest flybys of each chain; None where only the limits bind.
     indices : sequence of int
         Which to fly.
 
@@ -304,11 +314,12 @@ def fly_chains(
     list of (int, dict of arrays)
         Index and encoded chain.
     """
-    return [(index, _fly(hints[index], case)) for index in indices]
+    return [(index, _fly(hints[index], case, windows[index] if windows else None)) for index in indices]
 
 
-def _fly(hint: FlybyChain, case: TourCase) -> dict[str, Any]:
-    chain = refly(hint, case.targets, case.departure, case.limits, case.ephemeris, case.albedo)
+def _fly(hint: FlybyChain, case: TourCase, windows: Windows | None) -> dict[str, Any]:
+    asked = (case.targets, case.departure, case.limits, case.ephemeris, case.albedo)
+    chain = improve_dates(refly(hint, *asked), *asked, windows)
     path = None
     if chain.nbody_legs is not None:
         path = sampled_path(case.departure, chain.nbody_legs, case.ephemeris)

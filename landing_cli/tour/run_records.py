@@ -76,6 +76,42 @@ class TourFacts:
 
 
 @dataclass(frozen=True, eq=False)
+class SchemeModel:
+    """A printed scheme past asteroids where the paper seems to have had them: two-body orbits of late 2020.
+
+    Attributes
+    ----------
+    delta_v_m_s : (k,) float, m/s
+        Burns at instants of the printed days at which the asteroids stand at the printed distances from the
+        Earth (or nearest to them), chosen within the rounding to come nearest to the printed burns.
+    least_m_s : (k,) float, m/s
+        Burns at the instants of the printed days for which their sum is least.
+    """
+
+    delta_v_m_s: FloatArray
+    least_m_s: FloatArray
+
+
+@dataclass(frozen=True)
+class PrintedDay:
+    """An asteroid on the day that the paper prints for its flyby, on its two-body orbit of late 2020.
+
+    Attributes
+    ----------
+    scheme : int
+        Of Table 2.
+    designation : str
+    least_m, greatest_m : float, m
+        Distance from the Earth in the course of the day.
+    """
+
+    scheme: int
+    designation: str
+    least_m: float
+    greatest_m: float
+
+
+@dataclass(frozen=True, eq=False)
 class ChainEntry:
     """One chain of a run.
 
@@ -87,16 +123,15 @@ class ChainEntry:
     path : ChainPath or None
         None where no flight was found.
     facts : TourFacts
-    day_distance_m : (k, 2) float, m, or None
-        In a comparison: least and greatest distance of each asteroid from the Earth on the day that the
-        paper prints for its flyby.
+    model : SchemeModel or None
+        In a comparison: the same scheme in the paper's own terms.
     """
 
     name: str
     chain: FlybyChain
     path: ChainPath | None
     facts: TourFacts
-    day_distance_m: FloatArray | None = None
+    model: SchemeModel | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +149,8 @@ class TourRun:
         Where no chain keeps to the limits: the one that came nearest.
     broken : tuple of FlybyChain
         Chains of a search that do not hold in N-body.
+    days : tuple of PrintedDay
+        In a comparison: every flyby of Table 2 whose asteroid is among the targets.
     """
 
     cases: tuple[ChainEntry, ...]
@@ -121,3 +158,4 @@ class TourRun:
     depths: tuple[DepthReport, ...]
     nearest: FlybyChain | None
     broken: tuple[FlybyChain, ...] = ()
+    days: tuple[PrintedDay, ...] = ()

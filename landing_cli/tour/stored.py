@@ -18,9 +18,19 @@ from landing_cli.results.tree import Dataset, Group, table_group, table_rows
 from landing_cli.sources.catalogue_records import Catalogue
 from landing_cli.tour.escape_records import EscapeRun
 from landing_cli.tour.records import Departure, FlybyChain, Leg, SearchLimits, SearchMethod
-from landing_cli.tour.run_records import ChainEntry, ChainPath, RunKind, TourFacts, TourRun
+from landing_cli.tour.run_records import (
+    ChainEntry,
+    ChainPath,
+    PrintedDay,
+    RunKind,
+    SchemeModel,
+    TourFacts,
+    TourRun,
+)
 from landing_cli.tour.stored_chains import (
+    DAY_COLUMNS,
     DEPTH_COLUMNS,
+    MODEL_COLUMNS,
     PATH_COLUMNS,
     chain_from_group,
     chain_to_group,
@@ -78,6 +88,8 @@ def run_to_tree(run: TourRun | EscapeRun) -> Group:
         "cases": Group({e.name: _entry_to_group(e, order) for order, e in enumerate(run.cases)}),
     }
     members["broken"] = Group({f"{i:04d}": chain_to_group(chain) for i, chain in enumerate(run.broken)})
+    if run.days:
+        members["days"] = _days_to_group(run.days)
     if run.nearest is not None:
         members["nearest"] = chain_to_group(run.nearest)
     attributes = {name: getattr(facts, name) for name in ("name", "kind", "method", "albedo", "ephemeris")}
@@ -141,6 +153,7 @@ def _run_from_tree(tree: Group) -> TourRun:
         depths_of(table_rows(tree.group("depths"), DEPTH_COLUMNS)),
         chain_from_group(tree.group("nearest")) if "nearest" in tree.members else None,
         tuple(chain_from_group(group) for _, group in sorted(_groups(tree.group("broken")).items())),
+        _days_from_group(tree.group("days")) if "days" in tree.members else (),
     )
 
 
@@ -154,13 +167,9 @@ def _entry_to_group(entry: ChainEntry, order: int) -> Group:
     if entry.path is not None:
         columns = {column.name: getattr(entry.path, column.name) for column in PATH_COLUMNS}
         members["trajectory"] = table_group(columns, PATH_COLUMNS, "sample")
-    if entry.day_distance_m is not None:
-        members["day_distance_m"] = Dataset(
-            entry.day_distance_m,
-            "m",
-            "least and greatest distance from the Earth on the day that the paper prints",
-            ("flyby", "least_greatest"),
-        )
+    if entry.model is not None:
+        columns = {column.name: getattr(entry.model, column.name) for column in MODEL_COLUMNS}
+        members["model"] = table_group(columns, MODEL_COLUMNS, "flyby")
     return Group(members, {**group.attributes, "order": order})
 
 
@@ -173,10 +182,27 @@ def _entry_from_group(name: str, group: Group, facts: TourFacts) -> ChainEntry:
         if not len(rows):
             raise ValueError(f"the trajectory of {name} is empty")
         path = ChainPath(**{column.name: np.ascontiguousarray(rows[column.name]) for column in PATH_COLUMNS})
-    days = group.dataset("day_distance_m").data if "day_distance_m" in group.members else None
-    if days is not None and days.shape != (len(chain.legs), 2):
-        raise ValueError(f"day_distance_m of {name} has the shape {days.shape}")
-    return ChainEntry(name, chain, path, facts, days)
+    model = None
+    if "model" in group.members:
+        burns = table_rows(group.group("model"), MODEL_COLUMNS)
+        if len(burns) != len(chain.legs):
+            raise ValueError(f"the model of {name} has {len(burns)} burns")
+        model = SchemeModel(**{c.name: np.ascontiguousarray(burns[c.name]) for c in MODEL_COLUMNS})
+    return ChainEntry(name, chain, path, facts, model)
+
+
+def _days_to_group(days: Sequence[PrintedDay]) -> Group:
+    table = table_group(table_of(days, DAY_COLUMNS), DAY_COLUMNS, "printed_flyby")
+    names = Dataset(np.array([day.designation for day in days]), "1", "designation", ("printed_flyby",))
+    return Group({**table.members, "designation": names})
+
+
+def _days_from_group(group: Group) -> tuple[PrintedDay, ...]:
+    rows, names = table_rows(group, DAY_COLUMNS), group.dataset("designation").data.tolist()
+    return tuple(
+        PrintedDay(int(row["scheme"]), str(name), float(row["least_m"]), float(row["greatest_m"]))
+        for row, name in zip(rows, names, strict=True)
+    )
 
 
 def _targets_to_group(targets: Catalogue) -> Group:

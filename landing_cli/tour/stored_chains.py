@@ -40,6 +40,15 @@ PATH_COLUMNS = (
     Column("earth_m", "f8", "m", "the Earth, heliocentric, ecliptic and equinox J2000", (3,)),
     Column("arc", "i8", "1", "coast: 0 before the first burn, i after burn i"),
 )
+MODEL_COLUMNS = (
+    Column("delta_v_m_s", "f8", "m s-1", "burns past the paper's asteroids, at the printed distances"),
+    Column("least_m_s", "f8", "m s-1", "burns past the paper's asteroids, least sum on the printed days"),
+)
+DAY_COLUMNS = (
+    Column("scheme", "i8", "1", "of Table 2"),
+    Column("least_m", "f8", "m", "least distance from the Earth on the printed day"),
+    Column("greatest_m", "f8", "m", "greatest distance from the Earth on the printed day"),
+)
 DEPTH_COLUMNS = (
     Column("asteroids", "i8", "1", "length of the chains"),
     Column("tried", "i8", "1", "transfers computed"),
