@@ -22,7 +22,7 @@ from landing_cli.sources.ephemeris_kernel import EARTH, EARTH_MOON, MOON, SUN, E
 
 FloatArray = NDArray[np.float64]
 
-# DE440 (Park et al. 2021), m3/s2, systems with their moons; most Chebyshev terms first
+# DE440 (Park et al. 2021), m3/s2, systems with their moons
 GM_M3_S2 = {
     "Earth": 3.986_004_355_070_226_6e14,
     "Moon": 4.902_800_118_457_549_6e12,
@@ -50,13 +50,11 @@ class Ephemeris(NamedTuple):
         TDB seconds past J2000: the span that is covered.
     piece_s : float, s
         Length of the pieces.
-    widths : (k,) int
-        How many bodies have a term of each order; those with more terms come first.
-    coefficients : (p, k, b, 3) float, m
-        Chebyshev coefficients of the heliocentric positions, ecliptic and equinox J2000.
-    frame : (p, j, 3) float, m/s2
-        Chebyshev coefficients of the acceleration that the bodies give a craft relative to the Sun by pulling
-        at the Sun.
+    terms : (b + 1,) int
+        How many Chebyshev terms each row of the coefficients has.
+    coefficients : (p, b + 1, k, 3) float
+        Chebyshev coefficients of the heliocentric positions, m, ecliptic and equinox J2000; in the last row
+        (m/s2) of what the bodies' pull at the Sun adds to a heliocentric acceleration.
     gm : (b,) float, m3/s2
         Gravitational parameters, in the order of `BODIES`.
     gm_sun : float, m3/s2
@@ -65,9 +63,8 @@ class Ephemeris(NamedTuple):
     start_s: float
     end_s: float
     piece_s: float
-    widths: NDArray[np.int64]
+    terms: NDArray[np.int64]
     coefficients: FloatArray
-    frame: FloatArray
     gm: FloatArray
     gm_sun: float
 
@@ -93,17 +90,15 @@ def body_positions(ephemeris: Ephemeris, t: float, ahead: float, out: FloatArray
         return
     place = min(int(elapsed / ephemeris.piece_s), ephemeris.coefficients.shape[0] - 1)
     x = 2.0 * ((t - (ephemeris.start_s + place * ephemeris.piece_s)) + ahead) / ephemeris.piece_s - 1.0
-    before, now = x, 1.0  # T(-1) and T(0)
-    last = out.shape[0] - 1
-    out[:] = 0.0
-    for k in range(ephemeris.widths.shape[0]):
-        for body in range(ephemeris.widths[k]):
-            for axis in range(3):
-                out[body, axis] += now * ephemeris.coefficients[place, k, body, axis]
-        if k < ephemeris.frame.shape[1]:
-            for axis in range(3):
-                out[last, axis] += now * ephemeris.frame[place, k, axis]
-        before, now = now, 2.0 * x * now - before
+    for row in range(ephemeris.terms.shape[0]):  # Clenshaw's recurrence, an axis each
+        u = v = w = u_before = v_before = w_before = 0.0
+        for k in range(ephemeris.terms[row] - 1, 0, -1):
+            u, u_before = ephemeris.coefficients[place, row, k, 0] + 2.0 * x * u - u_before, u
+            v, v_before = ephemeris.coefficients[place, row, k, 1] + 2.0 * x * v - v_before, v
+            w, w_before = ephemeris.coefficients[place, row, k, 2] + 2.0 * x * w - w_before, w
+        out[row, 0] = ephemeris.coefficients[place, row, 0, 0] + x * u - u_before
+        out[row, 1] = ephemeris.coefficients[place, row, 0, 1] + x * v - v_before
+        out[row, 2] = ephemeris.coefficients[place, row, 0, 2] + x * w - w_before
 
 
 @kernel
@@ -130,13 +125,11 @@ def body_states(ephemeris: Ephemeris, body: int, t: FloatArray, out: FloatArray)
         before, now = x, 1.0
         slope_before, slope = 1.0, 0.0
         out[i] = 0.0
-        for k in range(ephemeris.widths.shape[0]):
-            if body < ephemeris.widths[k]:
-                for axis in range(3):
-                    out[i, axis] += now * ephemeris.coefficients[place, k, body, axis]
-                    out[i, 3 + axis] += (
-                        2.0 / ephemeris.piece_s * slope * ephemeris.coefficients[place, k, body, axis]
-                    )
+        for k in range(ephemeris.terms[body]):
+            for axis in range(3):
+                coefficient = ephemeris.coefficients[place, body, k, axis]
+                out[i, axis] += now * coefficient
+                out[i, 3 + axis] += 2.0 / ephemeris.piece_s * slope * coefficient
             slope_before, slope = slope, 2.0 * now + 2.0 * x * slope - slope_before
             before, now = now, 2.0 * x * now - before
 
@@ -181,19 +174,16 @@ def ephemeris_of(span: EphemerisSpan) -> Ephemeris:
     positions = _heliocentric(span)  # (p, nodes, b, 3)
     gm = np.array([GM_M3_S2[name] for name in BODIES])
     pull = gm[:, None] * positions / np.linalg.norm(positions, axis=3, keepdims=True) ** 3
-    coefficients, frame = _chebyshev(positions), _chebyshev(-pull.sum(axis=2))
-    size = np.abs(coefficients).max(axis=(0, 3))  # (k, b)
-    terms = np.array(
-        [np.flatnonzero(size[:, body] > _DROPPED * size[0, body])[-1] + 1 for body in range(len(gm))]
-    )
-    widths = np.array([np.flatnonzero(terms > k)[-1] + 1 for k in range(terms.max())], dtype=np.int64)
+    rows = np.concatenate([positions, -pull.sum(axis=2, keepdims=True)], axis=2)
+    coefficients = _chebyshev(rows).swapaxes(1, 2)  # (p, b + 1, k, 3)
+    size = np.abs(coefficients).max(axis=(0, 3))
+    terms = np.array([np.flatnonzero(row > _DROPPED * row[0])[-1] + 1 for row in size], dtype=np.int64)
     return Ephemeris(
         start_s=float(span.edges_s[0]),
         end_s=float(span.edges_s[-1]),
         piece_s=float(span.edges_s[1] - span.edges_s[0]),
-        widths=widths,
-        coefficients=np.ascontiguousarray(coefficients[:, : terms.max()]),
-        frame=np.ascontiguousarray(frame[:, : terms.max()]),
+        terms=terms,
+        coefficients=np.ascontiguousarray(coefficients[:, :, : terms.max()]),
         gm=gm,
         gm_sun=GM_SUN_M3_S2,
     )

@@ -28,7 +28,9 @@ def real_sky() -> Ephemeris:
 def empty_sky() -> Ephemeris:
     """The real sky with weightless planets."""
     sky = real_sky()
-    return sky._replace(gm=np.zeros_like(sky.gm), frame=np.zeros_like(sky.frame))
+    coefficients = sky.coefficients.copy()
+    coefficients[:, -1] = 0.0
+    return sky._replace(gm=np.zeros_like(sky.gm), coefficients=coefficients)
 
 
 def circular_sky(share: float, span_s: float) -> tuple[Ephemeris, float]:
@@ -41,14 +43,14 @@ def circular_sky(share: float, span_s: float) -> tuple[Ephemeris, float]:
     count = int(np.ceil(span_s / piece))
     knots = np.cos(np.pi * (np.arange(terms) + 0.5) / terms)
     t = piece * (np.arange(count)[:, None] + 0.5 * (1.0 + knots))
-    positions = np.full((count, terms, len(BODIES), 3), 1e15)
-    positions[:, :, row] = AU_M * np.stack([np.cos(rate * t), np.sin(rate * t), 0.0 * t], axis=-1)
+    rows = np.full((count, terms, len(BODIES) + 1, 3), 1e15)
+    rows[:, :, row] = AU_M * np.stack([np.cos(rate * t), np.sin(rate * t), 0.0 * t], axis=-1)
+    rows[:, :, -1] = -gm[row] / AU_M**3 * rows[:, :, row]
     basis = np.cos(np.outer(np.arange(terms), np.pi * (np.arange(terms) + 0.5) / terms)) * 2.0 / terms
     basis[0] *= 0.5
-    coefficients = np.ascontiguousarray(np.einsum("kn,pnbx->pkbx", basis, positions))
-    frame = np.ascontiguousarray(-gm[row] / AU_M**3 * coefficients[:, :, row])
-    widths = np.full(terms, len(BODIES), dtype=np.int64)
-    return Ephemeris(0.0, count * piece, piece, widths, coefficients, frame, gm, GM_SUN_M3_S2), rate
+    coefficients = np.ascontiguousarray(np.einsum("kn,pnbx->pbkx", basis, rows))
+    counts = np.full(len(BODIES) + 1, terms, dtype=np.int64)
+    return Ephemeris(0.0, count * piece, piece, counts, coefficients, gm, GM_SUN_M3_S2), rate
 
 
 class ScipySky:
