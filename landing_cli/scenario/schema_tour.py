@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
@@ -12,6 +12,7 @@ from landing_cli.scenario.schema_base import Number3, Section, wrong
 
 EARTH_RADIUS_KM = 6378.137
 AU_KM = 149_597_870.7
+LONGEST_D = 30 * 366
 Days = Annotated[float, Field(ge=0, le=3653)]
 Designation = Annotated[str, Field(min_length=1, max_length=40)]
 AltitudeRange = tuple[
@@ -157,7 +158,10 @@ class BeamSection(Section):
         description="waiting times between a flyby and the next burn that are tried, d",
     )
     branches: int = Field(
-        default=60, ge=1, le=10_000, description="next targets that are solved exactly from each partial chain"
+        default=60,
+        ge=1,
+        le=10_000,
+        description="next targets that are solved exactly from each partial chain",
     )
     kept_chains: int = Field(
         default=40, ge=1, le=10_000, description="chains, best first, that are flown again in N-body"
@@ -254,6 +258,8 @@ class TourSection(Section):
         start, end = (_moment(text) for text in (self.departure.epoch_utc, self.limits.end_utc))
         if end <= start:
             raise wrong("limits.end_utc", "is not after departure.epoch_utc", "the tour lies between them")
+        if end - start > timedelta(days=LONGEST_D):
+            raise wrong("limits.end_utc", "is more than 30 years after departure.epoch_utc", "check the year")
 
 
 class TourScenario(Section):

@@ -39,21 +39,21 @@ TABLE_COLUMNS = (
 ESCAPE_SHOWN = 5
 
 _NOTES = (
-    "as_printed_m_s, least_m_s: past the paper's asteroids, on two-body orbits of 2020-12-17. As printed: each at"
-    " the printed distance from the Earth, within its rounding nearest to the printed burns. Least: the least sum"
-    " on the printed days.",
-    "nbody_delta_v_m_s: past the same asteroids where the Sun, the planets, the Earth and the Moon take them,"
-    " within a day of the printed dates, for the least sum.",
-    "The start is inferred, not printed: {distance:.4g} km from the Earth's centre, {angle:.1f} degrees"
-    " counter-clockwise from the Sun, {speed:.0f} m/s outwards.",
+    "as_printed_m_s, least_m_s: past the paper's asteroids, on two-body orbits of 2020-12-17. As printed: "
+    "each at the printed distance from the Earth, within its rounding nearest to the printed burns. Least: "
+    "the least sum on the printed days.",
+    "nbody_delta_v_m_s: past the same asteroids where the Sun, the planets, the Earth and the Moon take "
+    "them, within a day of the printed dates, for the least sum.",
+    "The start is inferred, not printed: {distance:.4g} km from the Earth's centre, {angle:.1f} degrees "
+    "counter-clockwise from the Sun, {speed:.0f} m/s outwards.",
     "{fit} of the {objects} asteroids that have an orbit stand at the printed distance on the printed days.",
     "Sizes: the paper's eq 3 prints 329; 1329 km and an albedo of {albedo:g} give its table (H is rounded).",
 )
 _ESCAPE_NOTES = (
-    "two_body_m_s leads to infinity, two_body_reach_m_s to 1.5e6 km, where the paper's flights end. flown_m_s leads"
-    " there in N-body: median, least and most over a month and all directions of the orbit.",
-    "Without an atmosphere nothing takes the orbit with a perigee of 100 km down to the apogee of 4.8e5 km that the"
-    " paper states: its 42 m/s make good for drag, which is not modelled here.",
+    "two_body_m_s leads to infinity, two_body_reach_m_s to 1.5e6 km, where the paper's flights end. "
+    "flown_m_s leads there in N-body: median, least and most over a month and all directions of the orbit.",
+    "Without an atmosphere nothing takes the orbit with a perigee of 100 km down to the apogee of 4.8e5 km "
+    "that the paper states: its 42 m/s make good for drag, which is not modelled here.",
 )
 _NO_ORBIT = (
     ". 2014 NQ64 was seen on one day of 2014: no orbit known today says where the paper had it. Its date for "

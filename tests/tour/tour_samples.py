@@ -13,7 +13,14 @@ from landing_cli.results.store import write
 from landing_cli.sources.catalogue_records import Catalogue
 from landing_cli.tour.escape_records import EscapeFlight, EscapeMap, EscapeRun
 from landing_cli.tour.records import Departure, DepthReport, Flyby, FlybyChain, Leg, SearchLimits
-from landing_cli.tour.run_records import ChainEntry, ChainPath, TourFacts, TourRun
+from landing_cli.tour.run_records import (
+    ChainEntry,
+    ChainPath,
+    PrintedDay,
+    SchemeModel,
+    TourFacts,
+    TourRun,
+)
 from landing_cli.tour.stored import run_to_tree
 
 START_S = 6.71e8
@@ -99,6 +106,11 @@ def facts(kind: str = "search") -> TourFacts:
 
 def tour_run(kind: str = "search") -> TourRun:
     told = facts(kind)
+    if kind == "compare":
+        model = SchemeModel(np.array([295.0, 80.0]), np.array([298.0, 71.0]))
+        days = (PrintedDay(2, "2018 QE", 1.43e10, 1.46e10), PrintedDay(1, "12923", 3.26e10, 3.27e10))
+        entries = (ChainEntry("scheme_02", chain(), path(), told, model),)
+        return TourRun(entries, told, (), None, days=days)
     entries = tuple(
         ChainEntry(f"chain_{i + 1:02d}", chain(shift), path(), told) for i, shift in enumerate((0.0, 50.0))
     )
@@ -112,7 +124,10 @@ def escape_run() -> EscapeRun:
     a, b = radius + low[:, None], radius + high[None]
     increment = np.sqrt(2 * gm / a) * (1 - np.sqrt(b / (a + b)))
     entry = EscapeMap("moon", gm, radius, low, high, np.where(b >= a, increment, np.nan))
-    return EscapeRun((entry,), (EscapeFlight("perigee_100_km", 1e5, 1.5e9, 23.8, 40.0, "to 1.5e6 km"),))
+    return EscapeRun(
+        (entry,),
+        (EscapeFlight("perigee_100_km", 1e5, 1.5e9, 23.8, 20.0, 40.0, 30.0, 50.0, 1.4e9, "to 1.5e6 km"),),
+    )
 
 
 def write_run(file: Path, run: TourRun | EscapeRun, scenario: str = SCENARIO) -> Path:
