@@ -21,7 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 from landing_cli.flight.astronomy import DAY_S
 from landing_cli.tour.ephemeris import GM_M3_S2, Ephemeris, flight_ephemeris, states_of_body
 from landing_cli.tour.escape_records import EscapeFlight
-from landing_cli.tour.nbody import EARTH_RADIUS_M, fly_through
+from landing_cli.tour.forces import EARTH_RADIUS_M
+from landing_cli.tour.nbody import fly_through
 from landing_cli.tour.time_scales import utc_to_t_s
 
 FloatArray = NDArray[np.float64]

@@ -1,6 +1,5 @@
 """Flight under the Sun, the planets, the Earth and the Moon apart, with a step that follows the error.
 
-Newtonian point masses on the ephemeris' paths, and the Earth's oblateness; no relativity, radiation or drag.
 The integrator is Gauss-Radau collocation of order 15 with the step control of IAS15 (Rein and Spiegel 2015):
 the highest coefficient of the acceleration's polynomial stays a small share of the acceleration, or, next to
 a planet, of what the rounding of heliocentric positions makes of it. The bodies' places at the nodes are
@@ -15,21 +14,17 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from landing_cli.flight.astronomy import OBLIQUITY_RAD
 from landing_cli.flight.elements import OrbitElements, states_of
 from landing_cli.kernel import inlined, kernel
 from landing_cli.tour.ephemeris import EARTH_ROW, MOON_ROW, Ephemeris, body_positions
+from landing_cli.tour.forces import EARTH_RADIUS_M, craft_acceleration, first_step, rounding_of
 from landing_cli.tour.radau import NODES, Radau, radau
 
 FloatArray = NDArray[np.float64]
 
-EARTH_RADIUS_M = 6_378_136.3  # that the oblateness refers to
-EARTH_J2 = 1.082_625_27e-3  # DE440
 MOON_RADIUS_M = 1_738_000.0
 TOLERANCE = 1e-8  # share of the acceleration: millimetres in a year away from planets
 
-_POLE_Y, _POLE_Z = math.sin(OBLIQUITY_RAD), math.cos(OBLIQUITY_RAD)
-_OBLATE = 1.5 * EARTH_J2 * EARTH_RADIUS_M**2
 _STEPS_MAX = 100_000
 _ITERATIONS = 14
 _CONVERGED = 1e-13
@@ -55,58 +50,6 @@ REASONS = {
     FlightStatus.HIT_MOON: "it hits the Moon",
 }
 _ARRIVED, _OUTSIDE, _TOO_SMALL, _HIT_EARTH, _HIT_MOON = (int(status) for status in FlightStatus)
-
-
-@kernel
-def craft_acceleration(
-    ephemeris: Ephemeris, bodies: FloatArray, x: float, y: float, z: float
-) -> tuple[float, float, float]:
-    """Heliocentric acceleration of a craft.
-
-    Parameters
-    ----------
-    ephemeris : Ephemeris
-        Gravitational parameters.
-    bodies : (b + 1, 3) float, m and m/s2
-        Of `body_positions` at the time.
-    x, y, z : float, m
-        Heliocentric position.
-
-    Returns
-    -------
-    tuple of 3 float, m/s2
-    """
-    square = x * x + y * y + z * z
-    pull = -ephemeris.gm_sun / (square * math.sqrt(square))
-    count = bodies.shape[0] - 1
-    ax, ay, az = bodies[count, 0] + pull * x, bodies[count, 1] + pull * y, bodies[count, 2] + pull * z
-    for body in range(count):
-        dx, dy, dz = bodies[body, 0] - x, bodies[body, 1] - y, bodies[body, 2] - z
-        square = dx * dx + dy * dy + dz * dz
-        pull = ephemeris.gm[body] / (square * math.sqrt(square))
-        if body == EARTH_ROW:
-            share = _OBLATE / square
-            height = _POLE_Y * dy + _POLE_Z * dz
-            ay += 2.0 * pull * share * height * _POLE_Y
-            az += 2.0 * pull * share * height * _POLE_Z
-            pull *= 1.0 + share * (1.0 - 5.0 * height * height / square)
-        ax += pull * dx
-        ay += pull * dy
-        az += pull * dz
-    return ax, ay, az
-
-
-@inlined
-def _first_step(ephemeris: Ephemeris, bodies: FloatArray, state: FloatArray) -> float:
-    """A fifth of the shortest time scale about any body, s."""
-    square = state[0] ** 2 + state[1] ** 2 + state[2] ** 2
-    shortest = square * math.sqrt(square) / ephemeris.gm_sun
-    for body in range(bodies.shape[0] - 1):
-        square = 0.0
-        for axis in range(3):
-            square += (bodies[body, axis] - state[axis]) ** 2
-        shortest = min(shortest, square * math.sqrt(square) / ephemeris.gm[body])
-    return 0.2 * math.sqrt(shortest)
 
 
 @kernel
@@ -192,18 +135,6 @@ def _growth(scheme: Radau, tolerance: float, rounding: float, forces: FloatArray
     return 4.0 if highest <= 1e-5 * wanted else min(4.0, (wanted / highest) ** (1.0 / 7.0))
 
 
-@kernel
-def _rounding(ephemeris: Ephemeris, bodies: FloatArray, state: FloatArray) -> float:
-    """What the last digit of a heliocentric position is worth in acceleration, m/s2."""
-    gradient = 0.0
-    for body in range(bodies.shape[0] - 1):
-        square = 0.0
-        for axis in range(3):
-            square += (bodies[body, axis] - state[axis]) ** 2
-        gradient = max(gradient, ephemeris.gm[body] / (square * math.sqrt(square)))
-    return 2.2e-16 * gradient * math.sqrt(state[0] ** 2 + state[1] ** 2 + state[2] ** 2)
-
-
 @inlined
 def _advance(scheme: Radau, h: float, forces: FloatArray, state: FloatArray) -> None:
     """Carry a state over a step whose accelerations are known."""
@@ -281,7 +212,7 @@ def fly_state(
     status = _below_ground(bodies[0], state)
     if status != _ARRIVED:
         return status
-    h = math.copysign(_first_step(ephemeris, bodies[0], state), end - start)
+    h = math.copysign(first_step(ephemeris, bodies[0], state), end - start)
     t, reached, place = start, 0.0, 0  # reached: the step that the forces are of; none yet
     for _ in range(_STEPS_MAX):
         left = end - t
@@ -298,7 +229,7 @@ def fly_state(
             else:
                 forces[n, 0], forces[n, 1], forces[n, 2] = ax, ay, az
         settled = _collocate(ephemeris, scheme, length, state, bodies, forces)
-        ratio = _growth(scheme, tolerance, _rounding(ephemeris, bodies[0], state), forces)
+        ratio = _growth(scheme, tolerance, rounding_of(ephemeris, bodies[0], state), forces)
         if not (settled and ratio > 0.25):
             reached = 0.0
             h = length * (max(ratio, 0.1) if settled and ratio > 0.0 else 0.25)

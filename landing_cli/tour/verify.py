@@ -20,7 +20,7 @@ from landing_cli.flight.elements import states_of
 from landing_cli.sources.ephemeris_points import BODIES, Points, heliocentric_points
 from landing_cli.tour.ephemeris import GM_M3_S2
 from landing_cli.tour.escape_records import EscapeMap
-from landing_cli.tour.nbody import EARTH_J2, EARTH_RADIUS_M
+from landing_cli.tour.forces import EARTH_J2, EARTH_RADIUS_M
 from landing_cli.tour.records import Flyby, FlybyChain, Leg
 from landing_cli.tour.run_records import ChainEntry, TourFacts
 from landing_cli.tour.targets import diameter_m

@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose
 from landing_cli.flight.astronomy import AU_M, DAY_S, GM_SUN_M3_S2
 from landing_cli.flight.elements import elements_of_catalogue, states_of
 from landing_cli.flight.kepler import propagate_kepler
-from landing_cli.tour.lambert import lambert_arcs, least_time, solve_lambert, solve_x, time_of_flight
+from landing_cli.tour.lambert import lambert_arcs, solve_lambert
+from landing_cli.tour.lambert_time import least_time, solve_x, time_of_flight
 
 MU = GM_SUN_M3_S2
 ARCS = 10_000
