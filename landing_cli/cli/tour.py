@@ -294,6 +294,10 @@ def _carry_out(
     voice = console.Console(quiet)
     case = tour_case(loaded)
     _say_catalogue(case, voice)
+    known = set(case.catalogue.designations)
+    for name in loaded.scenario.tour.targets.exclude:
+        if name not in known:
+            voice.say(f"tour.targets.exclude: {name} is not in {case.catalogue.source}")
     path = output or Path("runs") / f"{case.name}-tour-{command}.h5"
     if dry_run:
         _print_facts({"run": str(path), **case_facts(case)}, as_json)

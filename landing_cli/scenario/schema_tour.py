@@ -14,7 +14,9 @@ EARTH_RADIUS_KM = 6378.137
 AU_KM = 149_597_870.7
 LONGEST_D = 30 * 366
 Days = Annotated[float, Field(ge=0, le=3653)]
-Designation = Annotated[str, Field(min_length=1, max_length=40)]
+Designation = Annotated[
+    str, Field(pattern=r"^([0-9]{1,7}|[12][0-9]{3} [A-Z]{2}[0-9]{0,3}|[0-9]{4} (P-L|T-[123]))$")
+]
 AltitudeRange = tuple[
     Annotated[float, Field(gt=0, le=1e9)],
     Annotated[float, Field(gt=0, le=1e9)],
@@ -119,7 +121,7 @@ class TargetsSection(Section):
     )
     numbered_only: bool = Field(default=False, description="whether only numbered asteroids are targets")
     exclude: tuple[Designation, ...] = Field(
-        default=(), max_length=1000, description="designations left out: [2014 NQ64]"
+        default=(), max_length=1000, description="designations left out, as 12923 or 2014 NQ64"
     )
     albedo: float = Field(
         default=0.15,
@@ -171,7 +173,7 @@ class BeamSection(Section):
 class LayeredSection(Section):
     """The multi-layer preferential selection of Liu et al. (2023), section 2.3."""
 
-    distance_km: Kilometres = Field(
+    coast_distance_max_km: Kilometres = Field(
         default=3e7, description="d: first selection drops targets that the coast passes farther away, km"
     )
     k1: int = Field(default=20, ge=1, le=100_000, description="kept by each criterion of the first selection")

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from landing_cli.errors import InputRefused
 from landing_cli.flight.astronomy import AU_M, DAY_S
 from landing_cli.scenario.load import LoadedTour
+from landing_cli.scenario.messages import Problem, refusal
 from landing_cli.scenario.schema_tour import DepartureSection, LimitsSection, TargetsSection, TourSection
 from landing_cli.sources.catalogue_files import read_catalogue
 from landing_cli.sources.catalogue_records import Catalogue
@@ -143,7 +145,14 @@ def catalogue_of(loaded: LoadedTour) -> Catalogue:
         It is missing or none.
     """
     name = loaded.scenario.tour.catalogue
-    return embedded_catalogue() if name == EMBEDDED else read_catalogue(find_catalogue(name, loaded.beside))
+    if name == EMBEDDED:
+        return embedded_catalogue()
+    try:
+        path = find_catalogue(name, loaded.beside)
+    except InputRefused as error:
+        problem = Problem(("tour", "catalogue"), f"{error.where}: {error.what}", error.fix)
+        raise refusal([problem], loaded.places, loaded.source) from error
+    return read_catalogue(path)
 
 
 def target_limits(section: TargetsSection) -> TargetLimits:
@@ -215,7 +224,7 @@ def search_options(section: TourSection) -> BeamOptions | LayeredOptions:
         )
     layered = section.layered
     return LayeredOptions(
-        distance_m=layered.distance_km * 1e3,
+        distance_m=layered.coast_distance_max_km * 1e3,
         k1=layered.k1,
         k2=layered.k2,
         k3=layered.k3,
