@@ -6,6 +6,7 @@ type 2) in the ICRF are taken, which all of JPL's planetary kernels are made of.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.errors import InputRefused
-from landing_cli.flight.astronomy import DAY_S, J2000_JD
+from landing_cli.flight.astronomy import AU_M, DAY_S, J2000_JD
 
 FloatArray = NDArray[np.float64]
 
@@ -26,6 +27,9 @@ SUN, EARTH_MOON, EARTH, MOON = 10, 3, 399, 301
 _NEEDED = ((0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (0, 6), (0, 7), (0, 8), (0, SUN), (EARTH_MOON, EARTH),
            (EARTH_MOON, MOON))  # fmt: skip
 _POSITIONS, _ICRF = 2, 1
+# what jplephem raises on a cut or overwritten file
+_DAMAGE = (ValueError, TypeError, IndexError, OverflowError, ZeroDivisionError, struct.error)
+_DAMAGED = "is damaged: what it lists is not there"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +71,20 @@ def read_span(kernel: str, start_t_s: float, end_t_s: float, nodes: int = 14) ->
     Raises
     ------
     InputRefused
-        If the extra is missing, the file is no planetary kernel, or the span is outside it.
+        If the extra is missing, the file is no planetary kernel, it is damaged, or the span is outside it.
     """
     with opened_kernel(kernel) as (spk, name):
         segments = {pair: _segment(spk, pair, name) for pair in _NEEDED}
-        _check_cover(segments.values(), start_t_s, end_t_s, name)
-        edges = _edges(segments.values(), start_t_s, end_t_s, name)
         knots = np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes)
-        positions = {pair: _sampled(segment, edges, knots) for pair, segment in segments.items()}
+        try:
+            _check_cover(segments.values(), start_t_s, end_t_s, name)
+            edges = _edges(segments.values(), start_t_s, end_t_s, name)
+            positions = {pair: _sampled(segment, edges, knots) for pair, segment in segments.items()}
+        except _DAMAGE as error:
+            raise InputRefused(_DAMAGED, where=name, fix=_fix(kernel)) from error
+    distance_au = np.linalg.norm(positions[0, EARTH_MOON] - positions[0, SUN], axis=-1) / AU_M
+    if not (distance_au.min() > 0.95 and distance_au.max() < 1.05):
+        raise InputRefused(_DAMAGED, where=name, fix=_fix(kernel))
     return EphemerisSpan(name, edges, positions)
 
 
@@ -102,12 +112,14 @@ def opened_kernel(kernel: str) -> Iterator[tuple[Any, str]]:
     except ImportError as error:
         raise InputRefused("the ephemerides need the extra 'tour'", where="jplephem", fix=MISSING) from error
     path = _path_of(kernel)
+    if path.exists() and not path.is_file():
+        raise InputRefused("cannot be read (it is no file)", where=str(path), fix=_fix(kernel))
     try:
         spk = SPK.open(str(path))
     except OSError as error:
         told = error.strerror or str(error)
         raise InputRefused(f"cannot be read ({told})", where=str(path), fix=_fix(kernel)) from error
-    except ValueError as error:
+    except _DAMAGE as error:
         raise InputRefused("is no SPK kernel", where=str(path), fix=_fix(kernel)) from error
     try:
         yield spk, DE440 if kernel.upper() == DE440 else path.name

