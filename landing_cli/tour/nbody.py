@@ -329,7 +329,11 @@ def fly(
 
 
 def fly_through(
-    states: ArrayLike, start_t_s: ArrayLike, times_s: ArrayLike, ephemeris: Ephemeris
+    states: ArrayLike,
+    start_t_s: ArrayLike,
+    times_s: ArrayLike,
+    ephemeris: Ephemeris,
+    tolerance: float = TOLERANCE,
 ) -> tuple[FloatArray, NDArray[np.int64]]:
     """Fly crafts or asteroids in N-body and note their states at common times.
 
@@ -343,6 +347,8 @@ def fly_through(
         When the states are noted, rising or falling.
     ephemeris : Ephemeris
         Over all flights.
+    tolerance : float
+        Highest coefficient of the acceleration's polynomial over a step, as a share of the acceleration.
 
     Returns
     -------
@@ -350,7 +356,7 @@ def fly_through(
         States, NaN from where a craft did not get to, and a `FlightStatus` each.
     """
     times = np.atleast_1d(np.asarray(times_s, dtype=np.float64))
-    _, noted, status = _flown(states, start_t_s, times[-1], times, ephemeris, TOLERANCE)
+    _, noted, status = _flown(states, start_t_s, times[-1], times, ephemeris, tolerance)
     return noted, status
 
 
@@ -374,7 +380,9 @@ def _flown(
     return ends, noted, status
 
 
-def fly_elements(elements: OrbitElements, times_s: ArrayLike, ephemeris: Ephemeris) -> FloatArray:
+def fly_elements(
+    elements: OrbitElements, times_s: ArrayLike, ephemeris: Ephemeris, tolerance: float = TOLERANCE
+) -> FloatArray:
     """States of asteroids, flown in N-body from the epochs of their elements.
 
     Parameters
@@ -385,10 +393,13 @@ def fly_elements(elements: OrbitElements, times_s: ArrayLike, ephemeris: Ephemer
         TDB seconds past J2000, rising or falling.
     ephemeris : Ephemeris
         From the epochs to the times.
+    tolerance : float
+        Highest coefficient of the acceleration's polynomial over a step, as a share of the acceleration.
 
     Returns
     -------
     (n, k, 6) float, m and m/s
         Heliocentric, ecliptic and equinox J2000; NaN where one did not arrive.
     """
-    return fly_through(states_of(elements, ephemeris.gm_sun), elements.epoch_t_s, times_s, ephemeris)[0]
+    states = states_of(elements, ephemeris.gm_sun)
+    return fly_through(states, elements.epoch_t_s, times_s, ephemeris, tolerance)[0]
