@@ -18,7 +18,7 @@ from landing_cli.flight.elements import OrbitElements, states_of
 from landing_cli.kernel import inlined, kernel
 from landing_cli.tour.ephemeris import EARTH_ROW, MOON_ROW, Ephemeris, body_positions
 from landing_cli.tour.forces import EARTH_RADIUS_M, craft_acceleration, first_step, rounding_of
-from landing_cli.tour.radau import NODES, Radau, radau
+from landing_cli.tour.radau import NODES, Radau, extrapolate, radau, state_within
 
 FloatArray = NDArray[np.float64]
 
@@ -105,21 +105,6 @@ def _collocate(
 
 
 @kernel
-def _extrapolate(scheme: Radau, ratio: float, forces: FloatArray, ahead: FloatArray) -> None:
-    """Accelerations at the nodes of the next step, ``ratio`` times as long, by the last polynomial."""
-    for n in range(1, NODES):
-        at = 1.0 + ratio * scheme.nodes[n]
-        total = sx = sy = sz = 0.0
-        for j in range(NODES):
-            weight = scheme.leading[j] / (at - scheme.nodes[j])
-            total += weight
-            sx += weight * forces[j, 0]
-            sy += weight * forces[j, 1]
-            sz += weight * forces[j, 2]
-        ahead[n, 0], ahead[n, 1], ahead[n, 2] = sx / total, sy / total, sz / total
-
-
-@kernel
 def _growth(scheme: Radau, tolerance: float, rounding: float, forces: FloatArray) -> float:
     """How much longer the next step may be (Rein and Spiegel 2015, eq 11), at most fourfold."""
     size = highest = weights = 0.0
@@ -145,25 +130,6 @@ def _advance(scheme: Radau, h: float, forces: FloatArray, state: FloatArray) -> 
             two += scheme.second[NODES, n] * forces[n, axis]
         state[axis] += h * (state[3 + axis] + h * two)
         state[3 + axis] += h * one
-
-
-@kernel
-def _state_within(
-    scheme: Radau, h: float, share: float, state: FloatArray, forces: FloatArray, out: FloatArray
-) -> None:
-    """State at a share of a step that starts at ``state``."""
-    for axis in range(3):
-        one = two = 0.0
-        power = share
-        for k in range(NODES):
-            coefficient = 0.0
-            for j in range(NODES):
-                coefficient += scheme.monomials[j, k] * forces[j, axis]
-            one += coefficient * power / (k + 1)
-            power *= share
-            two += coefficient * power / ((k + 1) * (k + 2))
-        out[axis] = state[axis] + h * (share * state[3 + axis] + h * two)
-        out[3 + axis] = state[3 + axis] + h * one
 
 
 @kernel
@@ -221,7 +187,7 @@ def fly_state(
         for n in range(NODES):
             body_positions(ephemeris, t, scheme.nodes[n] * length, bodies[n])
         if reached != 0.0:
-            _extrapolate(scheme, length / reached, forces, ahead)
+            extrapolate(scheme, length / reached, forces, ahead)
         ax, ay, az = craft_acceleration(ephemeris, bodies[0], state[0], state[1], state[2])
         for n in range(NODES):
             if reached != 0.0 and n > 0:
@@ -238,7 +204,7 @@ def fly_state(
             continue
         while place < len(times) and (last or abs(times[place] - t) <= abs(length)):
             share = (times[place] - t) / length if length != 0.0 else 0.0
-            _state_within(scheme, length, share, state, forces, noted[place])
+            state_within(scheme, length, share, state, forces, noted[place])
             place += 1
         _advance(scheme, length, forces, state)
         if last:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from landing_cli.kernel import kernel
 from landing_cli.kernel_record import by_reference
 
 FloatArray = NDArray[np.float64]
@@ -69,3 +70,65 @@ def radau() -> Radau:
     second = np.einsum("nq,nqj->nj", w * (ends[:, None] - s), basis)
     others = [np.polynomial.polynomial.polyfromroots(np.delete(nodes, j)) for j in range(NODES)]
     return Radau(nodes, first, second, leading, leading[:, None] * np.array(others))
+
+
+@kernel
+def extrapolate(scheme: Radau, ratio: float, forces: FloatArray, ahead: FloatArray) -> None:
+    """Carry the polynomial of a step's accelerations on to the nodes of the next.
+
+    Parameters
+    ----------
+    scheme : Radau
+        Constants of the collocation.
+    ratio : float
+        Length of the next step over that of the last.
+    forces : (8, 3) float, m/s2
+        Accelerations at the nodes of the last step.
+    ahead : (8, 3) float, m/s2
+        Receives those at the nodes 1 to 7 of the next.
+    """
+    for n in range(1, NODES):
+        at = 1.0 + ratio * scheme.nodes[n]
+        total = sx = sy = sz = 0.0
+        for j in range(NODES):
+            weight = scheme.leading[j] / (at - scheme.nodes[j])
+            total += weight
+            sx += weight * forces[j, 0]
+            sy += weight * forces[j, 1]
+            sz += weight * forces[j, 2]
+        ahead[n, 0], ahead[n, 1], ahead[n, 2] = sx / total, sy / total, sz / total
+
+
+@kernel
+def state_within(
+    scheme: Radau, h: float, share: float, state: FloatArray, forces: FloatArray, out: FloatArray
+) -> None:
+    """State within a step, by integration of the accelerations' polynomial.
+
+    Parameters
+    ----------
+    scheme : Radau
+        Constants of the collocation.
+    h : float, s
+        Length of the step.
+    share : float
+        How far into it, 0 to 1.
+    state : (6,) float, m and m/s
+        At its start.
+    forces : (8, 3) float, m/s2
+        Accelerations at its nodes.
+    out : (6,) float, m and m/s
+        Receives the state.
+    """
+    for axis in range(3):
+        one = two = 0.0
+        power = share
+        for k in range(NODES):
+            coefficient = 0.0
+            for j in range(NODES):
+                coefficient += scheme.monomials[j, k] * forces[j, axis]
+            one += coefficient * power / (k + 1)
+            power *= share
+            two += coefficient * power / ((k + 1) * (k + 2))
+        out[axis] = state[axis] + h * (share * state[3 + axis] + h * two)
+        out[3 + axis] = state[3 + axis] + h * one
