@@ -248,7 +248,7 @@ def extended(chains: Chains, space: SearchSpace, rounds: int) -> Chains:
         Longer by one flyby, at most ``branches`` of each; costs beyond the limit among them, infinite ones
         not.
     """
-    coasts = _coasts_of(chains, space)
+    coasts = coasts_of(chains, space)
     count, keep = len(coasts.first), 2 * space.branches
     target = np.zeros((count, keep), dtype=np.int64)
     arrival, estimate = np.zeros((count, keep)), np.zeros((count, keep))
@@ -293,7 +293,21 @@ def _distinct(
     return chosen
 
 
-def _coasts_of(chains: Chains, space: SearchSpace) -> Coasts:
+def coasts_of(chains: Chains, space: SearchSpace) -> Coasts:
+    """Lay the coasts after the last flybys of chains on the grid.
+
+    Parameters
+    ----------
+    chains : Chains
+        c partial chains.
+    space : SearchSpace
+        Grid and waits.
+
+    Returns
+    -------
+    Coasts
+        One for each chain and wait; those of one chain follow each other.
+    """
     grid = space.table.grid_t_s
     waits, m = len(space.waits_s), len(grid)
     count = len(chains) * waits
