@@ -111,6 +111,7 @@ def hub_cases() -> list[tuple[np.ndarray, np.ndarray, float]]:
     return list(zip(first, second, days * DAY_S, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["gooding1990", "izzo2015"])
 def test_against_lamberthub(solver: str) -> None:
     lamberthub = pytest.importorskip("lamberthub")

@@ -43,6 +43,7 @@ def near_earth(distance_m: float, angle_rad: float, speed_m_s: float) -> np.ndar
     return earth + np.concatenate([distance_m * outward, speed_m_s * outward])
 
 
+@pytest.mark.slow
 def test_against_scipy_and_jplephem_for_asteroids() -> None:
     sky, states = ScipySky(), asteroids(3)
     flown, status = fly(states, START_S + 1e6, START_S + 1e6 + 1.5 * YEAR_S, real_sky())
@@ -53,6 +54,7 @@ def test_against_scipy_and_jplephem_for_asteroids() -> None:
         assert np.linalg.norm(ours[3:] - theirs[3:]) < 1e-5
 
 
+@pytest.mark.slow
 def test_against_scipy_and_jplephem_from_the_earth() -> None:
     """The spacecraft from 1.5 million km, and one that leaves from above the atmosphere."""
     sky = ScipySky()
