@@ -152,9 +152,9 @@ class BeamSection(Section):
     """The beam search: the best partial chains are extended, flyby by flyby."""
 
     beam: int = Field(default=200, ge=1, le=100_000, description="partial chains kept at each length")
-    time_step_d: float = Field(default=2.0, gt=0, le=100, description="grid of arrival times, d")
+    time_step_d: float = Field(default=4.0, gt=0, le=100, description="grid of arrival times, d")
     waits_d: tuple[Days, ...] = Field(
-        default=(0.0,),
+        default=(0.0, 30.0),
         min_length=1,
         max_length=100,
         description="waiting times between a flyby and the next burn that are tried, d",

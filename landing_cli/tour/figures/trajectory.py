@@ -129,18 +129,15 @@ def _draw_distance(axes: Axes, entry: ChainEntry, path: ChainPath, legs: tuple[L
         high = flyby.geocentric_distance_m / 1e9
         axes.plot(at, high, marker="o", color=colour, ms=6, mec="white", mew=0.8, zorder=5)
         told = (
-            f"{leg.designation}  {t_s_to_utc(flyby.t_s)[:10]}\n{leg.size_m_s:.1f} m/s; "
+            f"{t_s_to_utc(flyby.t_s)[:10]}  {leg.designation}: {leg.size_m_s:.1f} m/s, "
             f"passes at {flyby.speed_m_s / 1e3:.1f} km/s"
         )
-        axes.annotate(
-            told, (at, high), (-7, 4), textcoords="offset points", ha="right", va="bottom", fontsize=8,
-            color=colour,
-        )  # fmt: skip
+        axes.text(0.03, 0.965 - 0.042 * i, told, transform=axes.transAxes, fontsize=8, color=colour, va="top")
         burn = (leg.burn_t_s - path.t_s[0]) / DAY_S
         axes.plot(burn, np.interp(burn, days, distances), marker="^", color=colour, ms=6, zorder=6)
     axes.set(xlabel="time since the departure (d)", ylabel="distance from the Earth (million km)")
     axes.set_xlim(-0.02 * days[-1], 1.04 * days[-1])
-    axes.set_ylim(0.0, 1.22 * distances.max())
+    axes.set_ylim(0.0, (1.08 + 0.05 * len(legs)) * distances.max())
     axes.set_title("b  distance from the Earth; triangles: burns")
     axes.grid(True)
 
