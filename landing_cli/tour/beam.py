@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from landing_cli.flight.astronomy import GM_SUN_M3_S2
 from landing_cli.flight.kepler import kepler_state
 from landing_cli.kernel import kernel
-from landing_cli.tour.chain_kernel import LEAST_LEG_S, LEG_COLUMNS, Bounds, FirstLegs, Scratch, improve_dates
+from landing_cli.tour.chain_dates import improve_dates
+from landing_cli.tour.chain_kernel import LEAST_LEG_S, LEG_COLUMNS, Bounds, FirstLegs, Scratch
 from landing_cli.tour.coast_scan import Coasts, coast_from, rows_of, scan_targets
 from landing_cli.tour.ephemeris import Ephemeris
 from landing_cli.tour.target_table import TargetTable, state_from_nodes

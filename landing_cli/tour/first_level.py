@@ -15,13 +15,11 @@ from landing_cli.tour.ephemeris import Ephemeris
 from landing_cli.tour.first_legs import Fan, Fly, fly_fan, shoot
 from landing_cli.tour.nbody import fly
 from landing_cli.tour.records import Departure
-from landing_cli.tour.target_table import positions_at
+from landing_cli.tour.target_table import SEARCH_TOLERANCE, positions_at
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-FLIGHT_TOLERANCE = 1e-6
-"""Of the N-body flights of a search: metres to kilometres, where hints are good to hundreds."""
 BURN_DATES = 3
 """First burns that are tried between the departure and the longest wait."""
 ROUNDS = 12
@@ -45,7 +43,7 @@ def carrier(ephemeris: Ephemeris) -> Fly:
     """
 
     def carry(states: FloatArray, start_t_s: FloatArray, end_t_s: FloatArray) -> FloatArray:
-        return fly(states, start_t_s, end_t_s, ephemeris, FLIGHT_TOLERANCE)[0]
+        return fly(states, start_t_s, end_t_s, ephemeris, SEARCH_TOLERANCE)[0]
 
     return carry
 

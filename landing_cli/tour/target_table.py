@@ -17,6 +17,8 @@ from landing_cli.tour.nbody import fly_elements
 
 FloatArray = NDArray[np.float64]
 
+SEARCH_TOLERANCE = 1e-6
+"""Of the N-body flights of a search: metres to some kilometres, where a hint is good to hundreds."""
 NODE_SPACING_S = 40.0 * DAY_S
 """Half of it lies between a time and the nearest node: the planets pull less than 1000 km, unless close."""
 
@@ -59,7 +61,7 @@ def target_table(
     span = end_t_s - start_t_s
     nodes = start_t_s + span * np.linspace(0.0, 1.0, 1 + max(1, int(np.ceil(span / NODE_SPACING_S))))
     grid = start_t_s + span * np.linspace(0.0, 1.0, 1 + max(2, int(np.ceil(span / step_s))))
-    node_states = fly_elements(elements, nodes, ephemeris)
+    node_states = fly_elements(elements, nodes, ephemeris, SEARCH_TOLERANCE)
     grid_m = np.full((len(elements), 3, len(grid)), np.nan, dtype=np.float32)
     fill_grid(nodes, node_states, grid, grid_m)
     return TargetTable(nodes, node_states, grid, grid_m)
