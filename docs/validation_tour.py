@@ -109,7 +109,7 @@ most over a month of epochs and all directions of the orbit:
 
 {flights}
 
-{chr(10).join(told["notes"])}"""
+{_listed(told["notes"])}"""
 
 
 def _compared(run: TourRun) -> str:
@@ -150,7 +150,7 @@ def _compared(run: TourRun) -> str:
 
 {schemes}
 
-{chr(10).join(told["notes"])}
+{_listed(told["notes"])}
 
 {_verified(run)}"""
 
@@ -194,6 +194,10 @@ How far the search looked:
 {depths}
 
 {_verified(run)}"""
+
+
+def _listed(notes: list[str]) -> str:
+    return "\n".join(f"- {note}" for note in notes)
 
 
 def _better(chains: list[dict[str, Any]]) -> str:
