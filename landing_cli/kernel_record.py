@@ -86,4 +86,11 @@ def _unbox_record(record: RecordType, value: Any, c: Any) -> Any:
     native = c.unbox(record.fields, value)
     model = c.context.data_model_manager[record.fields]
     place = _cgutils.alloca_once_value(c.builder, model.as_data(c.builder, native.value))
-    return _extending.NativeValue(place, is_error=native.is_error, cleanup=native.cleanup)
+
+    def give_back() -> None:
+        """Drop what unboxing the fields took: a pointer has no count of references of its own."""
+        if native.cleanup is not None:
+            native.cleanup()
+        c.context.nrt.decref(c.builder, record.fields, native.value)
+
+    return _extending.NativeValue(place, is_error=native.is_error, cleanup=give_back)

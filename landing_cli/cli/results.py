@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from types import ModuleType
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from landing_cli.cli import console, plan, reach
+from landing_cli.cli import console, plan, reach, tour
 from landing_cli.cli.options import Force, Jobs, Json, Output, Quiet, ResultFile, new_group
 from landing_cli.errors import InputRefused, OutputRefused, UsageError, VerificationFailed
 
@@ -21,10 +22,13 @@ if TYPE_CHECKING:
 app = new_group("Look at, export, draw, verify and compare result files.")
 
 # missions whose results this version reads: how to print them; each brings stored, figures, verify
-MISSIONS: dict[str, ModuleType] = {"reach": reach, "plan": plan}
+MISSIONS: dict[str, ModuleType] = {"reach": reach, "plan": plan, "tour": tour}
 
 CaseName = Annotated[
-    str | None, typer.Option("--case", metavar="NAME", help="One case, as north_pole_700s; all unless given.")
+    str | None,
+    typer.Option(
+        "--case", metavar="NAME", help="One case, as north_pole_700s or chain_01; all unless given."
+    ),
 ]
 Facet = Annotated[
     int | None, typer.Option("--facet", metavar="N", help="One facet, 0-based, in the shape file's order.")
@@ -38,6 +42,7 @@ class ExportedTable(StrEnum):
     BOUNDARY = "boundary"
     TRAJECTORY = "trajectory"
     SUMMARY = "summary"
+    FLYBYS = "flybys"
 
 
 class ExportFormat(StrEnum):
@@ -72,7 +77,7 @@ def show(
         _refuse_facet(result)
         printer.print_facet(cases, facet, run, as_json)
     else:
-        printer.print_run(type(found)(cases), run, as_json)
+        printer.print_run(replace(found, cases=cases), run, as_json)
 
 
 @app.command()
@@ -113,7 +118,8 @@ def verify(
 def export(
     run: ResultFile,
     table: Annotated[
-        ExportedTable | None, typer.Option(help="What; facets unless given (of a plan: trajectory).")
+        ExportedTable | None,
+        typer.Option(help="What; facets unless given (of a plan: trajectory, of a tour: summary)."),
     ] = None,
     case: CaseName = None,
     facet: Facet = None,
@@ -271,12 +277,11 @@ def _exported(
         return str(exports.export_table(run, table.value, form.value, case, flown)).encode()
     from datetime import UTC, datetime
 
-    from landing_cli.results.oem import to_oem
     from landing_cli.scenario.load import parse
 
-    body = parse(result.identity.scenario, "the stored scenario").tree["body"]
+    scenario = parse(result.identity.scenario, "the stored scenario").tree
     created = datetime.now(UTC).isoformat()
-    return to_oem(flown, run.asteroid.name, "lander", body.get("epoch_utc"), created).encode()
+    return str(exports.export_oem(run, flown, scenario, created)).encode()
 
 
 def _read(path: Path) -> StoredResult:

@@ -9,11 +9,11 @@ import typer
 
 from landing_cli.cli import console
 from landing_cli.cli.options import Force, Json, Output, Overrides, Quiet, ScenarioName, new_group
-from landing_cli.errors import OutputRefused
+from landing_cli.errors import OutputRefused, UsageError
 
 if TYPE_CHECKING:
     from landing_cli.scenario.build import Built
-    from landing_cli.scenario.load import LoadedScenario
+    from landing_cli.scenario.load import LoadedScenario, LoadedTour
     from landing_cli.scenario.schema import Scenario
 
 app = new_group("Start, look at and check scenario files.")
@@ -23,11 +23,14 @@ app = new_group("Start, look at and check scenario files.")
 def init(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the scenario.")],
     shape: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="FILE", help="Shape file of the body: a path, or a name `landing shapes` lists."
         ),
-    ],
+    ] = None,
+    tour: Annotated[
+        bool, typer.Option("--tour", help="A tour of asteroids instead: without a body, without a shape.")
+    ] = False,
     length_unit: Annotated[str, typer.Option(metavar="km|m", help="Unit of the shape file.")] = "km",
     density_kg_m3: Annotated[
         float, typer.Option("--density", metavar="KG_M3", help="Density assumed for the body.")
@@ -37,17 +40,25 @@ def init(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a commented scenario for any body: NAME.yaml, with numbers that fit the shape.
+    """Write a commented scenario that runs as it is: NAME.yaml, for any body, or for a tour of asteroids.
 
-    Start, thrust and times of flight follow from the body's size, the density and the period, so
-    that the file runs as it is; then replace them by your own.
+    Of a body, start, thrust and times of flight follow from its size, the density and the period. Replace
+    the numbers by your own.
     """
-    from landing_cli.scenario.init import scenario_text
-
     path = output or Path(f"{name}.yaml")
-    text = scenario_text(name, shape, length_unit, density_kg_m3, rotation_period_h, path.parent)
+    if tour == (shape is not None):
+        raise UsageError("a scenario is of one body or of a tour", fix="give --shape FILE or --tour")
+    if shape is None:
+        from landing_cli.scenario.init_tour import tour_text
+
+        text, command = tour_text(name), "tour search"
+    else:
+        from landing_cli.scenario.init import scenario_text
+
+        text = scenario_text(name, shape, length_unit, density_kg_m3, rotation_period_h, path.parent)
+        command = "reach run"
     _write_new(path, text, force)
-    console.Console(quiet).say(f"wrote {path}; look it over, then: reach run {path}")
+    console.Console(quiet).say(f"wrote {path}; look it over, then: {command} {path}")
 
 
 @app.command()
@@ -55,11 +66,11 @@ def show(
     scenario: ScenarioName, overrides: Overrides = None, as_json: Json = False, quiet: Quiet = False
 ) -> None:
     """Print a scenario with every default, as YAML that can be read back."""
-    from landing_cli.scenario.load import load
+    from landing_cli.scenario.load import load_any
     from landing_cli.scenario.schema import to_tree
     from landing_cli.scenario.show import to_yaml
 
-    loaded = load(scenario, overrides or ())
+    loaded = load_any(scenario, overrides or ())
     console.Console(quiet).say(f"read {loaded.source}")
     if as_json:
         console.print_json(to_tree(loaded.scenario))
@@ -71,22 +82,16 @@ def show(
 def check(
     scenario: ScenarioName, overrides: Overrides = None, as_json: Json = False, quiet: Quiet = False
 ) -> None:
-    """Check a scenario and its shape, without solving anything."""
-    from landing_cli.scenario.build import build
-    from landing_cli.scenario.load import load
+    """Check a scenario and its shape or catalogue, without solving anything."""
+    from landing_cli.scenario.load import Loaded, load_any
+    from landing_cli.scenario.schema import Scenario
 
-    loaded = load(scenario, overrides or ())
+    loaded = load_any(scenario, overrides or ())
     console.Console(quiet).say(f"read {loaded.source}")
-    built = build(loaded)
-    facts = {
-        "scenario": loaded.scenario.name,
-        "facets": len(built.asteroid.mesh.faces),
-        "gm_m3_s2": built.asteroid.gm_m3_s2,
-        "rotation_rate_rad_s": built.asteroid.rotation_rate_rad_s,
-        **_reach_facts(loaded.scenario, built),
-        **_plan_facts(loaded, built),
-        "shape_sha256": built.shape_sha256,
-    }
+    if isinstance(loaded.scenario, Scenario):
+        facts = _landing_facts(Loaded(loaded.scenario, loaded.source, loaded.beside, loaded.places))
+    else:
+        facts = _tour_facts(Loaded(loaded.scenario, loaded.source, loaded.beside, loaded.places))
     if as_json:
         console.print_json(facts)
     else:
@@ -99,6 +104,28 @@ def schema() -> None:
     from landing_cli.scenario.schema import json_schema
 
     console.print_json(json_schema())
+
+
+def _landing_facts(loaded: LoadedScenario) -> dict[str, object]:
+    from landing_cli.scenario.build import build
+
+    built = build(loaded)
+    return {
+        "scenario": loaded.scenario.name,
+        "facets": len(built.asteroid.mesh.faces),
+        "gm_m3_s2": built.asteroid.gm_m3_s2,
+        "rotation_rate_rad_s": built.asteroid.rotation_rate_rad_s,
+        **_reach_facts(loaded.scenario, built),
+        **_plan_facts(loaded, built),
+        "shape_sha256": built.shape_sha256,
+    }
+
+
+def _tour_facts(loaded: LoadedTour) -> dict[str, object]:
+    from landing_cli.cli.tour import case_facts
+    from landing_cli.tour.cases import tour_case
+
+    return case_facts(tour_case(loaded))
 
 
 def _reach_facts(scenario: Scenario, built: Built) -> dict[str, object]:

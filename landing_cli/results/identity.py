@@ -23,7 +23,7 @@ class RunIdentity:
     scenario : str
         The resolved scenario as text, defaults included.
     shape_sha256 : str
-        Hash of the shape file.
+        Hash of the shape file; of a tour, of the catalogue.
     package_version : str
     schema_version : int
         Version of the layout of result files.
@@ -79,7 +79,8 @@ class RunIdentity:
         if self.scenario != stored.scenario:
             lines += _changed_lines(stored.scenario, self.scenario)  # comments change no number
         if self.shape_sha256 != stored.shape_sha256:
-            lines.append(f"shape: sha256 {stored.shape_sha256[:12]}... -> {self.shape_sha256[:12]}...")
+            read = "catalogue" if self.command.startswith("tour") else "shape"
+            lines.append(f"{read}: sha256 {stored.shape_sha256[:12]}... -> {self.shape_sha256[:12]}...")
         for name in ("command", "package_version", "schema_version", "chunk_facets"):
             before, now = getattr(stored, name), getattr(self, name)
             if now != before:

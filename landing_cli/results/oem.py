@@ -2,10 +2,39 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
+import numpy as np
+from numpy.typing import NDArray
+
 from landing_cli.errors import InputRefused
+from landing_cli.flight.astronomy import OBLIQUITY_RAD
 from landing_cli.flight.trajectory import Trajectory
+
+_J2000 = datetime(2000, 1, 1, 12)
+
+
+@dataclass(frozen=True, eq=False)
+class HeliocentricArc:
+    """A coast between two burns.
+
+    Attributes
+    ----------
+    t_s : (n,) float, s
+        TDB seconds past J2000.
+    position_m, velocity_m_s : (n, 3) float, m and m/s
+        Heliocentric, ecliptic and equinox J2000.
+    comment : str
+        What the arc is, in one line.
+    """
+
+    t_s: NDArray[np.float64]
+    position_m: NDArray[np.float64]
+    velocity_m_s: NDArray[np.float64]
+    comment: str
 
 
 def to_oem(
@@ -40,32 +69,82 @@ def to_oem(
     start = _parsed(epoch_utc)
     centre = body.upper().replace(" ", "_")
     times = [_stamp(start + timedelta(seconds=t)) for t in trajectory.t_s.tolist()]
-    header = [
+    comments = (
+        f"{centre}_FIXED rotates with the body: origin as in the scenario, z along the spin axis,",
+        "x and y as in the shape file. Velocities are relative to this rotating frame.",
+    )
+    meta = _meta(comments, spacecraft, centre, f"{centre}_FIXED", "UTC", times)
+    states = _states(times, trajectory.position_m, trajectory.velocity_m_s)
+    return "\n".join([*_header(created_utc), *meta, *states, ""])
+
+
+def to_heliocentric_oem(arcs: Sequence[HeliocentricArc], spacecraft: str, created_utc: str) -> str:
+    """Write an interplanetary flight as an OEM about the Sun, ICRF axes, a segment an arc.
+
+    Parameters
+    ----------
+    arcs : sequence of HeliocentricArc
+        In their order; an impulsive burn stands between two of them.
+    spacecraft : str
+        Name of the object.
+    created_utc : str
+        Creation date for the header, ISO 8601.
+
+    Returns
+    -------
+    str
+        Positions in km, velocities in km/s, TDB.
+    """
+    lines = _header(created_utc)
+    for arc in arcs:
+        times = [_stamp(_J2000 + timedelta(seconds=t)) for t in arc.t_s.tolist()]
+        lines += _meta((arc.comment,), spacecraft, "SUN", "ICRF", "TDB", times)
+        lines += [*_states(times, _equatorial(arc.position_m), _equatorial(arc.velocity_m_s)), ""]
+    return "\n".join(lines)
+
+
+def _header(created_utc: str) -> list[str]:
+    return [
         "CCSDS_OEM_VERS = 2.0",
         f"CREATION_DATE = {_stamp(_parsed(created_utc))}",
         "ORIGINATOR = LANDING",
         "",
+    ]
+
+
+def _meta(
+    comments: Sequence[str], spacecraft: str, centre: str, frame: str, system: str, times: Sequence[str]
+) -> list[str]:
+    return [
         "META_START",
-        f"COMMENT {centre}_FIXED rotates with the body: origin as in the scenario, z along the spin axis,",
-        "COMMENT x and y as in the shape file. Velocities are relative to this rotating frame.",
+        *(f"COMMENT {comment}" for comment in comments),
         f"OBJECT_NAME = {spacecraft.upper()}",
         "OBJECT_ID = NONE",
         f"CENTER_NAME = {centre}",
-        f"REF_FRAME = {centre}_FIXED",
-        "TIME_SYSTEM = UTC",
+        f"REF_FRAME = {frame}",
+        f"TIME_SYSTEM = {system}",
         f"START_TIME = {times[0]}",
         f"STOP_TIME = {times[-1]}",
         "META_STOP",
         "",
     ]
-    states = zip(
-        times, (trajectory.position_m / 1e3).tolist(), (trajectory.velocity_m_s / 1e3).tolist(), strict=True
-    )
-    lines = [
+
+
+def _states(
+    times: Sequence[str], position_m: NDArray[np.float64], velocity_m_s: NDArray[np.float64]
+) -> list[str]:
+    rows = zip(times, (position_m / 1e3).tolist(), (velocity_m_s / 1e3).tolist(), strict=True)
+    return [
         f"{time} {' '.join(f'{x:.12f}' for x in position)} {' '.join(f'{v:.15f}' for v in velocity)}"
-        for time, position, velocity in states
+        for time, position, velocity in rows
     ]
-    return "\n".join([*header, *lines, ""])
+
+
+def _equatorial(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turn ecliptic axes of J2000 into those of the ICRF, by the obliquity that they were made with."""
+    cosine, sine = math.cos(OBLIQUITY_RAD), math.sin(OBLIQUITY_RAD)
+    x, y, z = vectors.T
+    return np.column_stack([x, cosine * y - sine * z, sine * y + cosine * z])
 
 
 def _parsed(text: str | None) -> datetime:

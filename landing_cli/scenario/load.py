@@ -12,14 +12,21 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import yaml
 
 from landing_cli.errors import InputRefused, UsageError
 from landing_cli.scenario.locate import locate, read_text
 from landing_cli.scenario.messages import KeyPath, dotted, shown
-from landing_cli.scenario.schema import Scenario, from_tree
+from landing_cli.scenario.schema import (
+    AnyScenario,
+    Scenario,
+    from_tree,
+    is_tour,
+    tour_from_tree,
+)
+from landing_cli.scenario.schema_tour import TourScenario
 
 MAX_DEPTH = 16
 MAX_VALUES = 20_000
@@ -42,25 +49,32 @@ Scalar = str | int | float | bool | None
 Tree = Any  # dict[str, Tree] | list[Tree] | Scalar
 
 
+S = TypeVar("S", bound=AnyScenario, covariant=True)
+
+
 @dataclass(frozen=True)
-class LoadedScenario:
+class Loaded(Generic[S]):
     """A checked scenario and where it came from.
 
     Attributes
     ----------
-    scenario : Scenario
+    scenario : Scenario or TourScenario
     source : str
         The file that was read, as it is named to the user.
     beside : Path
-        The folder where its shape is searched first.
+        The folder where its shape or its catalogue is searched first.
     places : mapping
         "file:line" of every key that was written, by key path; for messages.
     """
 
-    scenario: Scenario
+    scenario: S
     source: str
     beside: Path
     places: Mapping[KeyPath, str]
+
+
+LoadedScenario = Loaded[Scenario]
+LoadedTour = Loaded[TourScenario]
 
 
 @dataclass(frozen=True)
@@ -96,6 +110,59 @@ def load(source: str, overrides: Sequence[str] = ()) -> LoadedScenario:
     return load_document(parse(read_text(found), found.name), found.name, found.beside, overrides)
 
 
+def load_tour(source: str, overrides: Sequence[str] = ()) -> LoadedTour:
+    """Read, override and check the scenario of a flyby tour.
+
+    Parameters
+    ----------
+    source : str
+        As for `load`.
+    overrides : sequence of str
+        ``dotted.key=value`` each.
+
+    Returns
+    -------
+    LoadedTour
+
+    Raises
+    ------
+    InputRefused
+        The file cannot be read safely, what it says is wrong, or it is of a landing.
+    """
+    found = locate(source)
+    document = _overridden(parse(read_text(found), found.name), overrides)
+    scenario = tour_from_tree(document.tree, document.places, found.name)
+    return Loaded(scenario, found.name, found.beside, document.places)
+
+
+def load_any(source: str, overrides: Sequence[str] = ()) -> LoadedScenario | LoadedTour:
+    """Read, override and check a scenario of either kind.
+
+    Parameters
+    ----------
+    source : str
+        As for `load`.
+    overrides : sequence of str
+        ``dotted.key=value`` each.
+
+    Returns
+    -------
+    LoadedScenario or LoadedTour
+
+    Raises
+    ------
+    InputRefused
+        The file cannot be read safely, or what it says is wrong.
+    """
+    found = locate(source)
+    document = _overridden(parse(read_text(found), found.name), overrides)
+    if is_tour(document.tree):
+        tour = tour_from_tree(document.tree, document.places, found.name)
+        return Loaded(tour, found.name, found.beside, document.places)
+    landing = from_tree(document.tree, document.places, found.name)
+    return Loaded(landing, found.name, found.beside, document.places)
+
+
 def load_document(
     document: Document, source: str, beside: Path, overrides: Sequence[str] = ()
 ) -> LoadedScenario:
@@ -121,10 +188,9 @@ def load_document(
     InputRefused
         What it says is wrong.
     """
-    for override in overrides:
-        document = _with_override(document, override)
+    document = _overridden(document, overrides)
     scenario = from_tree(document.tree, document.places, source)
-    return LoadedScenario(scenario, source, beside, document.places)
+    return Loaded(scenario, source, beside, document.places)
 
 
 def parse(text: str, name: str) -> Document:
@@ -309,6 +375,12 @@ def _refuse_tabs_and_directives(text: str, name: str) -> None:
         raise InputRefused(
             "YAML directives (%) are not accepted", where=f"{name}:{line}", fix="remove the line"
         )
+
+
+def _overridden(document: Document, overrides: Sequence[str]) -> Document:
+    for override in overrides:
+        document = _with_override(document, override)
+    return document
 
 
 def _with_override(document: Document, override: str) -> Document:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import Discriminator, Field, Tag, ValidationError
+from pydantic import Discriminator, Field, Tag, TypeAdapter, ValidationError
 
-from landing_cli.scenario.messages import KeyPath, refusal
+from landing_cli.scenario.messages import KeyPath, Problem, refusal
 from landing_cli.scenario.schema_base import (
     Auto,
     Number3,
@@ -22,7 +22,10 @@ from landing_cli.scenario.schema_base import (
 )
 from landing_cli.scenario.schema_body import Body
 from landing_cli.scenario.schema_plan import PlanSection
+from landing_cli.scenario.schema_tour import TourScenario
 from landing_cli.scenario.translate import problems_of
+
+S = TypeVar("S", bound=Section)
 
 
 class SpacecraftSection(Section):
@@ -205,8 +208,11 @@ class Scenario(Section):
             raise wrong("reach", "is missing, and so is plan", "a scenario asks for one of them, or for both")
 
 
+AnyScenario = Scenario | TourScenario
+
+
 def from_tree(tree: Any, places: Mapping[KeyPath, str] | None = None, source: str = "scenario") -> Scenario:
-    """Check plain values and make the scenario of them.
+    """Check plain values and make the scenario of a landing of them.
 
     Parameters
     ----------
@@ -226,19 +232,63 @@ def from_tree(tree: Any, places: Mapping[KeyPath, str] | None = None, source: st
     InputRefused
         Something is wrong; each problem is named with its place, dotted key, value and fix.
     """
-    try:
-        # JSON's own strictness: a list is a tuple, but text is no number
-        return Scenario.model_validate_json(json.dumps(tree))
-    except ValidationError as error:
-        problems = problems_of(error, Scenario)
-    raise refusal(problems, places or {}, source)
+    if is_tour(tree):
+        problem = Problem(("tour",), "the scenario is of a flyby tour, without a body", "`tour` takes it")
+        raise refusal([problem], places or {}, source)
+    return _checked(tree, Scenario, places or {}, source)
 
 
-def to_tree(scenario: Scenario) -> dict[str, Any]:
-    """Return every key with its value or default, as plain values that `from_tree` reads back."""
+def tour_from_tree(
+    tree: Any, places: Mapping[KeyPath, str] | None = None, source: str = "scenario"
+) -> TourScenario:
+    """Check plain values and make the scenario of a flyby tour of them.
+
+    Parameters
+    ----------
+    tree : dict of plain values
+        As they stand in a scenario file.
+    places : mapping, optional
+        "file:line" of each key path, for messages.
+    source : str
+        What to call the scenario in messages.
+
+    Returns
+    -------
+    TourScenario
+
+    Raises
+    ------
+    InputRefused
+        Something is wrong; each problem is named with its place, dotted key, value and fix.
+    """
+    if isinstance(tree, dict) and not is_tour(tree):
+        problem = Problem(
+            ("tour",), "the scenario has no such section", "`tour` needs departure and limits there"
+        )
+        raise refusal([problem], {}, source)
+    return _checked(tree, TourScenario, places or {}, source)
+
+
+def is_tour(tree: Any) -> bool:
+    """Tell whether plain values are those of a flyby tour: they have a section ``tour``."""
+    return isinstance(tree, dict) and "tour" in tree
+
+
+def to_tree(scenario: AnyScenario) -> dict[str, Any]:
+    """Return every key with its value or default, as plain values that are read back."""
     return scenario.model_dump(mode="json")
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of scenario files, for editors."""
-    return Scenario.model_json_schema()
+    """Return the JSON Schema of scenario files, for editors: of a landing or of a tour."""
+    adapter: TypeAdapter[AnyScenario] = TypeAdapter(AnyScenario)
+    return adapter.json_schema()
+
+
+def _checked(tree: Any, model: type[S], places: Mapping[KeyPath, str], source: str) -> S:
+    try:
+        # JSON's own strictness: a list is a tuple, but text is no number
+        return model.model_validate_json(json.dumps(tree))
+    except ValidationError as error:
+        problems = problems_of(error, model)
+    raise refusal(problems, places, source)

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from landing_cli.scenario.schema import Scenario
+from landing_cli.scenario.schema import AnyScenario
 
 # words that a YAML reader of any version takes as text
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
@@ -17,12 +17,12 @@ _NOT_TEXT = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
 COMMENT_COLUMN = 44
 
 
-def to_yaml(scenario: Scenario, header: str = "") -> str:
+def to_yaml(scenario: AnyScenario, header: str = "") -> str:
     """Write a scenario as YAML that `load` reads back to the same scenario.
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : Scenario or TourScenario
         What to write.
     header : str
         Comment put at the top.
@@ -34,6 +34,21 @@ def to_yaml(scenario: Scenario, header: str = "") -> str:
     """
     lines = [f"# {line}".rstrip() for line in header.splitlines()]
     return "\n".join([*lines, *_section(scenario, "")]) + "\n"
+
+
+def section_to_yaml(section: BaseModel) -> str:
+    """Write one section of a scenario as YAML.
+
+    Parameters
+    ----------
+    section : BaseModel
+        What to write.
+
+    Returns
+    -------
+    str
+    """
+    return "\n".join(_section(section, "")) + "\n"
 
 
 def _section(section: BaseModel, indent: str) -> Iterator[str]:
@@ -62,6 +77,8 @@ def _line(text: str, comment: str) -> str:
 def _value(value: Any) -> str:
     if isinstance(value, tuple):
         return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, str):
         plain = _PLAIN.fullmatch(value) and value.lower() not in _NOT_TEXT
         return value if plain else json.dumps(value, ensure_ascii=False)

@@ -64,7 +64,8 @@ def _problem(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
     value = detail.get("input")
     meaning = field.description or "" if field else ""
     if kind == "contradiction":
-        extra = tuple(int(part) if part.isdigit() else part for part in str(context["key"]).split("."))
+        parts = [part for part in str(context["key"]).split(".") if part]  # none: the key itself
+        extra = tuple(int(part) if part.isdigit() else part for part in parts)
         return Problem((*path, *extra), str(context["what"]), str(context["fix"]))
     if kind == "missing":
         return Problem(path, "is missing", meaning)

@@ -21,8 +21,16 @@ SHIPPED = sorted((ROOT / "configs").glob("**/*.yaml"))
 
 MISSING, MISSPELT = object(), object()
 # values that may have either sign, those that may be zero, and keys that may be left out
-SIGNED = ("position_km", "position_m", "velocity_m_s", "acceleration_m_s2", "azimuth_deg")
-ZERO = ("facet", "clearance_m", "rotation_rate_rad_s")
+SIGNED = (
+    "position_km",
+    "position_m",
+    "velocity_m_s",
+    "acceleration_m_s2",
+    "azimuth_deg",
+    "sun_angle_deg",
+    "radial_speed_m_s",
+)
+ZERO = ("facet", "clearance_m", "rotation_rate_rad_s", "revolutions_max", "first_burn_wait_d")
 OPTIONAL = (
     "length_unit",
     "origin",
@@ -45,6 +53,22 @@ OPTIONAL = (
     "cone_half_angle_deg",
     "mass_model",
     "longitudes",
+    # of a tour
+    "catalogue",
+    "perihelion_max_au",
+    "exclude",
+    "albedo",
+    "asteroids_max",
+    "revolutions_max",
+    "first_burn_wait_d",
+    "beam",
+    "time_step_d",
+    "branches",
+    "kept_chains",
+    "coast_distance_max_km",
+    "k1",
+    "k2",
+    "k3",
 )
 Path_ = tuple[str | int, ...]
 
@@ -85,7 +109,7 @@ def mutations(path: Path_, value: Any) -> Iterator[tuple[str, Any]]:
     if not in_list and named not in OPTIONAL:
         yield "empty", None
         yield "missing", MISSING
-    if in_list and named != "tof_s":
+    if in_list and named not in ("tof_s", "exclude"):
         yield "missing", MISSING
 
 

@@ -1,0 +1,463 @@
+"""``tour``: which asteroids a spare spacecraft can visit on the way."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from landing_cli.cli import console, guard
+from landing_cli.cli.options import (
+    Backend,
+    BackendName,
+    DryRun,
+    Force,
+    Jobs,
+    Json,
+    Output,
+    Overrides,
+    Quiet,
+    Resume,
+    ScenarioName,
+    Scheduler,
+    StartOver,
+    _complete_scenario,
+    new_program,
+)
+from landing_cli.errors import NothingFeasible, PartialResult, UsageError
+
+if TYPE_CHECKING:
+    from landing_cli.scenario.load import LoadedTour
+    from landing_cli.tour.cases import TourCase
+    from landing_cli.tour.escape_records import EscapeRun
+    from landing_cli.tour.pipeline import Outcome, RunOptions
+    from landing_cli.tour.run_records import TourRun
+    from landing_cli.tour.verify import ChainReport
+
+# what `landing results export` writes of a tour
+TABLES = ("summary", "flybys", "trajectory")
+HAS_FACETS = False
+
+app = new_program("Which asteroids a spare spacecraft can fly by on its way.")
+
+_SHOWN = 20
+_CHAIN_COLUMNS = ("name", "asteroids", "nbody_delta_v_m_s", "delta_v_m_s", "duration_d", "front", "targets")
+_FLYBY_COLUMNS = (
+    "designation",
+    "date_utc",
+    "nbody_delta_v_m_s",
+    "delta_v_m_s",
+    "speed_m_s",
+    "phase_angle_deg",
+    "geocentric_distance_km",
+    "diameter_m",
+    "apparent_magnitude",
+)
+# what the Minor Planet Center publishes; the files change daily, so no hash is known beforehand
+_PUBLISHED = {
+    "nea": "https://www.minorplanetcenter.net/iau/MPCORB/NEA.txt",
+    "nea-extended": "https://www.minorplanetcenter.net/Extended_Files/nea_extended.json.gz",
+    "mpcorb": "https://www.minorplanetcenter.net/iau/MPCORB/MPCORB.DAT.gz",
+}
+
+CatalogueFile = Annotated[
+    str | None,
+    typer.Option(
+        "--catalogue",
+        metavar="FILE",
+        help="Catalogue to search, instead of tour.catalogue: MPCORB, MPC JSON, SBDB CSV; also gzipped.",
+    ),
+]
+OptionalScenario = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[SCENARIO]",
+        help="A path, a bare name, or - for stdin; ranges of the paper (Fig. 1) unless given.",
+        autocompletion=_complete_scenario,
+    ),
+]
+
+
+@app.command()
+def search(
+    scenario: ScenarioName,
+    catalogue: CatalogueFile = None,
+    output: Output = None,
+    jobs: Jobs = None,
+    backend: BackendName = Backend.THREADS,
+    scheduler: Scheduler = None,
+    resume: Resume = False,
+    force: StartOver = False,
+    overrides: Overrides = None,
+    dry_run: DryRun = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Search chains of flybys, and fly each again under the Sun, planets, Earth and Moon.
+
+    Prints the chains that hold, best first, with their N-body delta-v; the two-body number of the search
+    beside it is a hint. Writes runs/NAME-tour-search.h5 unless -o says otherwise.
+    """
+    loaded = _loaded(scenario, catalogue, overrides, quiet)
+    _carry_out("search", loaded, output, (jobs, backend, scheduler, resume, force), dry_run, as_json, quiet)
+
+
+@app.command()
+def compare(
+    scenario: ScenarioName,
+    catalogue: CatalogueFile = None,
+    output: Output = None,
+    jobs: Jobs = None,
+    backend: BackendName = Backend.THREADS,
+    scheduler: Scheduler = None,
+    resume: Resume = False,
+    force: StartOver = False,
+    overrides: Overrides = None,
+    dry_run: DryRun = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Fly the schemes of Liu et al. (2023), Table 2, and set what comes out beside what is printed.
+
+    Schemes whose asteroids the catalogue does not hold, or tour.targets.exclude leaves out, are told as such.
+    """
+    loaded = _loaded(scenario, catalogue, overrides, quiet)
+    _carry_out("compare", loaded, output, (jobs, backend, scheduler, resume, force), dry_run, as_json, quiet)
+
+
+@app.command()
+def escape(
+    scenario: OptionalScenario = None,
+    output: Output = None,
+    resume: Resume = False,
+    force: StartOver = False,
+    overrides: Overrides = None,
+    dry_run: DryRun = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Tell what it takes to leave the Moon and the Earth, over altitudes of periapsis and apoapsis.
+
+    Eqs 1-2 of Liu et al. (2023), corrected; two orbits about the Earth are flown in N-body beside them.
+    Draw the maps with `landing results plot`.
+    """
+    from landing_cli.parallel.plan import WorkPlan, pin_blas_threads
+
+    pin_blas_threads()
+    from landing_cli.tour.escape_run import escape_request, run_escape
+    from landing_cli.tour.pipeline import RunOptions
+
+    voice = console.Console(quiet)
+    loaded = None if scenario is None else _loaded(scenario, None, overrides, quiet)
+    if loaded is None and overrides:
+        raise UsageError("--set changes a scenario, and none is given", fix="name one")
+    request = escape_request(loaded)
+    path = output or Path("runs") / f"{request.name}-tour-escape.h5"
+    if dry_run:
+        facts = {"run": str(path), "scenario": request.name, **request.asked()}
+        _print_facts(facts, as_json)
+        return
+    outcome = run_escape(request, path, RunOptions(WorkPlan(), resume, force), voice.say)
+    _say_written(outcome, path, voice)
+    print_run(outcome.run, path, as_json)
+
+
+@app.command()
+def fetch(
+    catalogue: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[CATALOGUE]",
+            help="nea, nea-extended or mpcorb of the Minor Planet Center; nea unless given.",
+        ),
+    ] = None,
+    url: Annotated[str | None, typer.Option(metavar="URL", help="Another file, http or https.")] = None,
+    sha256: Annotated[
+        str | None,
+        typer.Option(metavar="HEX", help="What the file must be; recorded on first use unless given."),
+    ] = None,
+    folder: Annotated[Path, typer.Option("--into", metavar="FOLDER", help="Where to put it.")] = Path(
+        "catalog"
+    ),
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Download a catalogue of asteroids and check it; then: tour search SCENARIO --catalogue FILE."""
+    from landing_cli.sources.catalogue_files import read_catalogue
+    from landing_cli.sources.download import fetch_file
+
+    if url is not None and catalogue is not None:
+        raise UsageError("name a catalogue or a --url, not both")
+    address = url or _PUBLISHED.get(catalogue or "nea")
+    if address is None:
+        raise UsageError(
+            f"no catalogue {catalogue!r} is known", fix=f"take one of {', '.join(_PUBLISHED)}, or give --url"
+        )
+    voice = console.Console(quiet)
+    fetched = fetch_file(address, folder, sha256=sha256, force=force)
+    voice.say(f"{'downloaded' if fetched.fresh else 'found'} {fetched.path} (sha256 {fetched.sha256})")
+    found = read_catalogue(fetched.path)
+    voice.say(f"{len(found)} asteroids, {len(found.bad_rows)} bad rows left out")
+    console.print_text(str(fetched.path))
+
+
+def print_run(run: TourRun | EscapeRun, path: Path, as_json: bool) -> None:
+    """Print a run: tables, or the JSON object that scripts rely on.
+
+    Parameters
+    ----------
+    run : TourRun or EscapeRun
+        As it was found, or read from its file.
+    path : Path
+        Its file.
+    as_json : bool
+        Print JSON.
+    """
+    from landing_cli.tour.escape_records import EscapeRun
+
+    if isinstance(run, EscapeRun):
+        _print_escape(run, path, as_json)
+    elif run.facts.kind == "compare":
+        _print_comparison(run, path, as_json)
+    else:
+        _print_search(run, path, as_json)
+
+
+def print_verification(reports: Sequence[ChainReport], path: Path, as_json: bool) -> None:
+    """Print what the re-flight of chains found: a table, or JSON with every check.
+
+    Parameters
+    ----------
+    reports : sequence of ChainReport
+        One a chain.
+    path : Path
+        The run's file.
+    as_json : bool
+        Print JSON.
+    """
+    if as_json:
+        cases = [{**asdict(report), "verified": report.verified} for report in reports]
+        verified = all(report.verified for report in reports)
+        console.print_json({"run": str(path), "verified": verified, "cases": cases})
+        return
+    names = list(dict.fromkeys(name for report in reports for name in report.worst))
+    rows = [
+        [
+            report.case,
+            report.status,
+            *(report.worst[name].value if name in report.worst else None for name in names),
+            ("verified" if report.flown else "-") if report.verified else "FAILED",
+        ]
+        for report in reports
+    ]
+    console.print_table(["case", "status", *names, "verdict"], rows, title="Verification")
+
+
+def _loaded(scenario: str, catalogue: str | None, overrides: Sequence[str] | None, quiet: bool) -> LoadedTour:
+    from landing_cli.scenario.load import load_tour
+
+    changed = list(overrides or ())
+    if catalogue is not None:
+        changed.append(f"tour.catalogue={json.dumps(catalogue)}")
+    loaded = load_tour(scenario, changed)
+    console.Console(quiet).say(f"read {loaded.source}")
+    return loaded
+
+
+def _carry_out(
+    command: str,
+    loaded: LoadedTour,
+    output: Path | None,
+    way: tuple[int | None, Backend, str | None, bool, bool],
+    dry_run: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Read, search, fly, store, print, judge."""
+    jobs, backend, scheduler, resume, force = way
+    from landing_cli.parallel.plan import WorkPlan, pin_blas_threads
+
+    work = WorkPlan(
+        jobs=len(os.sched_getaffinity(0)) if jobs is None else jobs,
+        backend=backend.value,
+        scheduler=scheduler,
+    )
+    pin_blas_threads()
+    from landing_cli.tour.cases import tour_case
+    from landing_cli.tour.pipeline import Request, RunOptions, run_compare, run_search
+
+    voice = console.Console(quiet)
+    case = tour_case(loaded)
+    _say_catalogue(case, voice)
+    known = set(case.catalogue.designations)
+    for name in loaded.scenario.tour.targets.exclude:
+        if name not in known:
+            voice.say(f"tour.targets.exclude: {name} is not in {case.catalogue.source}")
+    path = output or Path("runs") / f"{case.name}-tour-{command}.h5"
+    if dry_run:
+        _print_facts({"run": str(path), **case_facts(case)}, as_json)
+        return
+    guard.hint_on_interrupt(f"finished flights are kept: continue with --resume (output {path})")
+    options: RunOptions = RunOptions(work, resume, force)
+    request = Request(f"tour {command}", loaded, case)
+    with voice.progress("flights") as progress:
+        run = run_search if command == "search" else run_compare
+        outcome = run(request, path, options, progress, voice.say)
+    guard.hint_on_interrupt("")
+    _say_written(outcome, path, voice)
+    print_run(outcome.run, path, as_json)
+    _judge(outcome, path, voice)
+
+
+def case_facts(case: TourCase) -> dict[str, Any]:
+    """Tell what a tour's scenario comes to, for `--dry-run` and `landing scenario check`.
+
+    Parameters
+    ----------
+    case : TourCase
+        The case.
+
+    Returns
+    -------
+    dict
+    """
+    from landing_cli.tour.time_scales import t_s_to_utc
+
+    return {
+        "scenario": case.name,
+        "catalogue": case.catalogue.source,
+        "rows": len(case.catalogue) + len(case.catalogue.bad_rows),
+        "bad_rows": len(case.catalogue.bad_rows),
+        "targets": len(case.targets),
+        "departure_utc": t_s_to_utc(case.departure.t_s),
+        "end_utc": t_s_to_utc(case.limits.end_t_s),
+        "delta_v_max_m_s": case.limits.delta_v_m_s,
+        "ephemeris": case.kernel,
+        "catalogue_sha256": case.catalogue.sha256,
+    }
+
+
+def _say_catalogue(case: TourCase, voice: console.Console) -> None:
+    catalogue = case.catalogue
+    voice.say(f"{catalogue.source}: {len(catalogue)} asteroids, of which {len(case.targets)} are targets")
+    if catalogue.bad_rows:
+        first = catalogue.bad_rows[0]
+        voice.warn(
+            f"{catalogue.source}: {len(catalogue.bad_rows)} bad rows left out, "
+            f"the first in line {first.line}: {first.reason}"
+        )
+
+
+def _say_written(outcome: Outcome, path: Path, voice: console.Console) -> None:
+    if outcome.up_to_date:
+        voice.say(f"{path} is up to date: same scenario, catalogue and version (--force solves again)")
+    else:
+        voice.say(f"wrote {path}")
+
+
+def _print_facts(facts: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        console.print_json(facts)
+    else:
+        console.print_table(["quantity", "value"], [[key, value] for key, value in facts.items()])
+
+
+def _print_search(run: TourRun, path: Path, as_json: bool) -> None:
+    from landing_cli.tour.summary import summarise_run
+
+    told = summarise_run(run)
+    if as_json:
+        console.print_json({"run": str(path), "scenario": run.facts.name, **told})
+        return
+    chains = told["chains"]
+    rows = [
+        [
+            *(chain[key] for key in _CHAIN_COLUMNS[:5]),
+            "front" if chain["name"] in told["front"] else "",
+            ", ".join(chain["targets"]),
+        ]
+        for chain in chains[:_SHOWN]
+    ]
+    if rows:
+        console.print_table(_CHAIN_COLUMNS, rows, title=f"Chains flown in N-body: {run.facts.name}")
+        more = f"; {len(chains) - _SHOWN} more in the file" if len(chains) > _SHOWN else ""
+        console.print_text(f"\nFlybys of {chains[0]['name']}{more}")
+        flybys = [[row[key] for key in _FLYBY_COLUMNS] for row in chains[0]["flybys"]]
+        console.print_table(_FLYBY_COLUMNS, flybys)
+
+
+def _print_comparison(run: TourRun, path: Path, as_json: bool) -> None:
+    from landing_cli.tour.comparison import TABLE_COLUMNS, compare_with_paper
+
+    told = compare_with_paper(run)
+    if as_json:
+        console.print_json({"run": str(path), "scenario": run.facts.name, **told})
+        return
+    rows = [[row[key] for key in TABLE_COLUMNS] for row in told["flybys"]]
+    console.print_table(TABLE_COLUMNS, rows, title="Liu et al. (2023), Table 2, and the same flown again")
+    for scheme in told["schemes"]:
+        console.print_text(f"\nscheme {scheme['number']}: {scheme['told']}")
+    console.print_text("\n" + "\n".join(told["notes"]))
+
+
+def _print_escape(run: EscapeRun, path: Path, as_json: bool) -> None:
+    from landing_cli.tour.comparison import escape_beside_paper, escape_table
+
+    told = escape_beside_paper(run)
+    if as_json:
+        console.print_json({"run": str(path), **told})
+        return
+    for entry in run.cases:
+        columns, rows = escape_table(entry)
+        console.print_text(f"{entry.name}: velocity increment, m/s; apoapsis altitude in km to the right")
+        console.print_table(columns, rows)
+        console.print_text("")
+    corners, flights = told["corners"], told["flights"]
+    if corners:
+        console.print_table(list(corners[0]), [list(row.values()) for row in corners])
+    if flights:
+        console.print_text("")
+        columns = [key for key in flights[0] if key != "told"]
+        console.print_table(columns, [[row[key] for key in columns] for row in flights])
+        console.print_text("\n" + "\n".join(told["notes"]))
+
+
+def _judge(outcome: Outcome, path: Path, voice: console.Console) -> None:
+    """Turn what was found into the exit code, and say what broke."""
+    from landing_cli.tour.run_records import TourRun
+
+    if outcome.lost:
+        name, reason = next(iter(outcome.lost.items()))
+        raise PartialResult(
+            f"{len(outcome.lost)} flights were lost to failures ({name}: {reason})",
+            where=str(path),
+            fix="--resume tries them again",
+        )
+    run = outcome.run
+    if not isinstance(run, TourRun) or run.facts.kind == "compare":
+        return
+    if run.broken:
+        first = run.broken[0]
+        voice.say(
+            f"{len(run.broken)} chains broke in N-body and were dropped "
+            f"({', '.join(first.targets)}: {first.message})"
+        )
+    if not run.cases:
+        raise NothingFeasible(
+            f"no chain of flybys keeps to the limits; {_nearest(run)}",
+            where=str(path),
+            fix="raise tour.limits.delta_v_m_s, move tour.limits.end_utc, or search a larger --catalogue",
+        )
+
+
+def _nearest(run: TourRun) -> str:
+    chain = run.nearest
+    if chain is None:
+        return "none came near"
+    reason = f": {chain.message}" if chain.message else ""
+    return f"the nearest is {', '.join(chain.targets)} for {chain.delta_v_m_s:.1f} m/s (two-body){reason}"

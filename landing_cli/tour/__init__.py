@@ -1,0 +1,1 @@
+"""The asteroids that a spare spacecraft can fly by on its way (Liu 2023)."""
