@@ -154,6 +154,7 @@ class ObserveCase:
     asteroid : Asteroid
         Its gravity is the field that the path flies in.
     spacecraft : Spacecraft
+        Its thrust on the flown mass is a bound.
     position_m, velocity_m_s : (3,) float, m, m/s, body frame
         The initial state relative to the rotating frame; the landing is at rest on the site (eq 15).
     frame : SiteFrame
@@ -169,8 +170,6 @@ class ObserveCase:
     sun_direction : (3,) float or None
         Unit vector to the sun in the body frame at the initial time; it turns backwards with the spin. None
         leaves illumination out.
-    thrust_limited : bool
-        Whether the thrust is held below the spacecraft's.
     clearance_m : float or None, m
         Distance to the terrain kept while the spacecraft is more than `clearance_free_m` from the site; None
         imposes none.
@@ -195,7 +194,6 @@ class ObserveCase:
     sensor: Sensor
     prior: Prior
     sun_direction: FloatArray | None
-    thrust_limited: bool
     clearance_m: float | None
     clearance_free_m: float
     glide_slope_half_angle_rad: float | None
@@ -271,7 +269,8 @@ class Path:
     peak_thrust_n : float, N
         Largest thrust on the flown mass.
     clearance_min_m : float, m
-        Least distance to the surface outside the ball about the site, negative below it.
+        Least distance to the surface outside the ball about the site, negative where the path cuts the body
+        anywhere; infinite where the whole path lies inside the ball.
     glide_slope_max_rad : float, rad
         Largest angle between the site frame's z and the line from the site to the spacecraft.
     status : {"planned", "infeasible", "unresolved"}
