@@ -28,7 +28,7 @@ Objective = Literal["energy", "information"]
 PathStatus = Literal["planned", "infeasible", "unresolved"]
 Parameter = float | int | str | bool | None | list[float] | list[list[float]] | list[str]
 
-REJECTIONS = ("range", "field_of_view", "emission", "incidence", "occlusion")
+REJECTIONS = ("range", "field_of_view", "emission", "incidence", "occlusion", "shadow")
 """The tests that a landmark passes to be seen, in the order in which they are made."""
 
 
@@ -314,7 +314,7 @@ class Seen:
         The sensor's times.
     visible : (T, n) bool
     rejected : mapping
-        How many pairs of time and landmark failed first at each of `REJECTIONS`.
+        How many pairs of time and landmark failed first at each of `REJECTIONS`; 0 where one was not made.
     lit : bool
         Whether illumination was tested.
     """
@@ -341,12 +341,17 @@ class Seen:
 
     @property
     def longest_gap_s(self) -> float:
-        """Longest stretch of the flight without a landmark in view, s.
+        """Longest stretch of the flight without a landmark in view, s; 0 where one always is.
 
         From the last time with one in view to the next, or to the ends of the flight.
         """
-        times = self.t_s[self.count > 0]
-        return float(np.diff(np.concatenate([self.t_s[:1], times, self.t_s[-1:]])).max())
+        seen = np.flatnonzero(self.count > 0)
+        if not len(seen):
+            return float(self.t_s[-1] - self.t_s[0])
+        ends = np.concatenate([[0], seen, [len(self.t_s) - 1]])
+        blind = np.diff(ends) > 1
+        blind[0], blind[-1] = seen[0] > 0, seen[-1] < len(self.t_s) - 1
+        return float(np.max(np.diff(self.t_s[ends])[blind], initial=0.0))
 
 
 @dataclass(frozen=True, eq=False)
