@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
-from landing_cli.scenario.schema_base import Number3, Seconds, Section, word_or_value, wrong
+from landing_cli.scenario.schema_base import Number3, Seconds, Section, as_tuple, word_or_value, wrong
 from landing_cli.scenario.schema_plan import SiteSection
 
 Angle = Annotated[float, Field(gt=0, le=180)]
@@ -15,19 +15,15 @@ WaypointCount = Annotated[int, Field(ge=0, le=199)]
 Weight = Annotated[float, Field(ge=0, le=1e3)]
 
 
-def _as_list(value: Any) -> Any:
-    return [value] if isinstance(value, int | float) and not isinstance(value, bool) else value
-
-
 WaypointCounts = Annotated[
     tuple[WaypointCount, ...],
     Field(min_length=1, max_length=100),
-    BeforeValidator(_as_list, json_schema_input_type=WaypointCount | list[WaypointCount]),
+    BeforeValidator(as_tuple, json_schema_input_type=WaypointCount | list[WaypointCount]),
 ]
 Weights = Annotated[
     tuple[Weight, ...],
     Field(min_length=1, max_length=100),
-    BeforeValidator(_as_list, json_schema_input_type=Weight | list[Weight]),
+    BeforeValidator(as_tuple, json_schema_input_type=Weight | list[Weight]),
 ]
 
 
