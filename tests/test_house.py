@@ -36,7 +36,8 @@ ROOMS: dict[str, set[str]] = {
     "results": TOOLS,
     "reach": RECORDS,
     "plan": RECORDS,
-    "cli": {"reach", "plan", *RECORDS},
+    "observe": RECORDS,
+    "cli": {"reach", "plan", "observe", *RECORDS},
 }
 # library -> the only place that knows it
 LIBRARIES = {

@@ -8,9 +8,11 @@ from typing import Any
 import typer
 
 from landing_cli import __version__
-from landing_cli.cli import plan, reach, results, scenario, shapes
+from landing_cli.cli import observe, plan, reach, results, scenario, shapes
 from landing_cli.cli.options import new_program
 from landing_cli.errors import ExitCode, InputRefused
+
+plan.app.command("observe")(observe.observe)
 
 # console script -> its commands
 MISSIONS: dict[str, typer.Typer] = {

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from landing_cli.cli import console, plan, reach
+from landing_cli.cli import console, observe, plan, reach
 from landing_cli.cli.options import Force, Jobs, Json, Output, Quiet, ResultFile, new_group
 from landing_cli.errors import InputRefused, OutputRefused, UsageError, VerificationFailed
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 app = new_group("Look at, export, draw, verify and compare result files.")
 
 # missions whose results this version reads: how to print them; each brings stored, figures, verify
-MISSIONS: dict[str, ModuleType] = {"reach": reach, "plan": plan}
+MISSIONS: dict[str, ModuleType] = {"reach": reach, "plan": plan, "observe": observe}
 
 CaseName = Annotated[
     str | None, typer.Option("--case", metavar="NAME", help="One case, as north_pole_700s; all unless given.")
@@ -38,6 +38,8 @@ class ExportedTable(StrEnum):
     BOUNDARY = "boundary"
     TRAJECTORY = "trajectory"
     SUMMARY = "summary"
+    LANDMARKS = "landmarks"
+    VIEW = "view"
 
 
 class ExportFormat(StrEnum):
@@ -113,7 +115,8 @@ def verify(
 def export(
     run: ResultFile,
     table: Annotated[
-        ExportedTable | None, typer.Option(help="What; facets unless given (of a plan: trajectory).")
+        ExportedTable | None,
+        typer.Option(help="What; facets unless given (of a plan: trajectory; of an observation: summary)."),
     ] = None,
     case: CaseName = None,
     facet: Facet = None,

@@ -204,7 +204,7 @@ class Scenario(Section):
     )
 
     def model_post_init(self, context: Any, /) -> None:
-        """Refuse a scenario that asks nothing."""
+        """Refuse a scenario that asks nothing, and a fit to a field that needs none."""
         if self.reach is None and self.plan is None and self.observe is None:
             raise wrong(
                 "reach", "is missing, and so are plan and observe", "a scenario asks for at least one"
