@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 
 from landing_cli import __version__
 from landing_cli.compile_cache import is_cached
-from landing_cli.body.gravity.interpolated import interpolated_field
 from landing_cli.flight.acceleration_control import natural_accelerations
 from landing_cli.observe.cases import observe_case
 from landing_cli.observe.clusters import cluster
-from landing_cli.observe.gravity_box import box_of
 from landing_cli.observe.landmark_source import with_landmarks_hash
 from landing_cli.observe.nominal import nominal_path
 from landing_cli.observe.records import (
@@ -222,6 +220,9 @@ def _solver_case(section: ObserveSection, case: ObserveCase) -> tuple[ObserveCas
     """Return the case in the field that the solvers fly in, and what is to be said of that field."""
     if section.gravity == "body":
         return case, {"gravity": case.asteroid.gravity.kind.name.lower()}
+    from landing_cli.body.gravity.interpolated import interpolated_field
+    from landing_cli.observe.gravity_box import box_of
+
     fitted = interpolated_field(case.asteroid.gravity, box_of(case))
     told: dict[str, Parameter] = {
         "gravity": "interpolated",
