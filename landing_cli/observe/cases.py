@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from datetime import datetime
 
 import numpy as np
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.bvh import SurfaceIndex, build_surface_index
 from landing_cli.body.clearance import signed_distances
+from landing_cli.body.gravity.field import GravityKind
+from landing_cli.body.gravity.polyhedron import polyhedron_field
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.observe.features import ThomasField, placed_landmarks, thomas_landmarks
 from landing_cli.observe.illumination import heliocentric_position_m, sun_direction
@@ -39,7 +42,7 @@ def observe_case(loaded: LoadedScenario, asteroid: Asteroid, spacecraft: Spacecr
     loaded : LoadedScenario
         Its ``observe`` section is read, and the file of landmarks that it names.
     asteroid : Asteroid
-        Its body.
+        Its body; the case may fly in another field of it.
     spacecraft : Spacecraft
         Its spacecraft.
 
@@ -54,6 +57,7 @@ def observe_case(loaded: LoadedScenario, asteroid: Asteroid, spacecraft: Spacecr
         its place.
     """
     section = observe_section(loaded)
+    asteroid = with_gravity(section, asteroid)
     surface = build_surface_index(asteroid.mesh)
     try:
         site = site_of(section.site, ("observe", "site"), asteroid.mesh, surface)
@@ -82,6 +86,27 @@ def observe_case(loaded: LoadedScenario, asteroid: Asteroid, spacecraft: Spacecr
         glide_slope_half_angle_rad=None if glide_slope is None else math.radians(glide_slope),
         surface=surface,
     )
+
+
+def with_gravity(section: ObserveSection, asteroid: Asteroid) -> Asteroid:
+    """Give the body the field that the landing flies in.
+
+    Parameters
+    ----------
+    section : ObserveSection
+        Its ``gravity``.
+    asteroid : Asteroid
+        In the scenario's own field, which may be too coarse for a flight near the ground.
+
+    Returns
+    -------
+    Asteroid
+        With the polyhedron's field, unless the section asks for the body's.
+    """
+    if section.gravity == "body" or asteroid.gravity.kind is GravityKind.POLYHEDRON:
+        return asteroid
+    field = polyhedron_field(asteroid.mesh.vertices, asteroid.mesh.faces, asteroid.gm_m3_s2)
+    return replace(asteroid, gravity=field)
 
 
 def sun_of(body: Body) -> FloatArray | None:

@@ -130,14 +130,28 @@ def tasks_of(section: ObserveSection) -> tuple[ObserveTask, ...]:
     -------
     tuple of ObserveTask
     """
-    shared = section.steering.model_dump()
-    counts, weights = shared.pop("waypoints"), section.information.weight
-    steered = [ObserveTask(f"waypoints_{m}", SteeringOptions(waypoints=m, **shared)) for m in counts]
+    steered = [ObserveTask(f"waypoints_{way.waypoints}", way) for way in steering_of(section)]
     if section.objective == "energy":
         return tuple(steered)
-    knots = section.information.knots
+    weights, knots = section.information.weight, section.information.knots
     informed = [ObserveTask(f"information_{w:.6g}", InformationOptions(w, knots)) for w in weights]
     return (*informed, *steered)
+
+
+def steering_of(section: ObserveSection) -> tuple[SteeringOptions, ...]:
+    """Return the paper's method for every number of waypoints that a scenario names.
+
+    Parameters
+    ----------
+    section : ObserveSection
+        Its ``steering``.
+
+    Returns
+    -------
+    tuple of SteeringOptions
+    """
+    shared = section.steering.model_dump()
+    return tuple(SteeringOptions(waypoints=m, **shared) for m in shared.pop("waypoints"))
 
 
 def run(
@@ -208,17 +222,17 @@ def ground_of(request: Request) -> Ground:
     section, case = observe_section(request.loaded), request.case
     solver_case, gravity = _solver_case(section, case)
     nominal = observed(case, nominal_path(solver_case))
+    ways = steering_of(section)
     given = section.steering.control_points_m
-    options = SteeringOptions(**{**section.steering.model_dump(), "waypoints": 0})
-    clustering = cluster(case, nominal.path, options) if given is None else None
+    clustering = cluster(case, nominal.path, ways[0]) if given is None else None
     points = given if clustering is None else _pairs(clustering.control_points_m)
     assert points is not None
-    return Ground(case, solver_case, gravity, nominal, clustering, points, section.steering.nodes)
+    return Ground(case, solver_case, gravity, nominal, clustering, points, ways)
 
 
 def _solver_case(section: ObserveSection, case: ObserveCase) -> tuple[ObserveCase, dict[str, Parameter]]:
     """Return the case in the field that the solvers fly in, and what is to be said of that field."""
-    if section.gravity == "body":
+    if section.gravity != "interpolated":
         return case, {"gravity": case.asteroid.gravity.kind.name.lower()}
     from landing_cli.body.gravity.interpolated import interpolated_field
     from landing_cli.observe.gravity_box import box_of

@@ -267,7 +267,8 @@ def _observation_from_group(
 def _objective(value: Any) -> Objective:
     if value not in get_args(Objective):
         raise ValueError(f"no objective {value}")
-    return value  # type: ignore[no-any-return]
+    objective: Objective = value
+    return objective
 
 
 def _unfit(what: str, where: str = "") -> InputRefused:

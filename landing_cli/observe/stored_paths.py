@@ -111,8 +111,9 @@ def make_observed(arrays: Mapping[str, NDArray[Any]], facts: Mapping[str, Any]) 
     numbers: dict[str, Any] = {name: float(facts[name]) for name in _PATH_NUMBERS}
     if facts["status"] not in get_args(PathStatus):
         raise ValueError(f"no status {facts['status']}")
+    columns: dict[str, Any] = parts["path"]
     path = Path(
-        **parts["path"],
+        **columns,
         **numbers,
         status=facts["status"],
         message=str(facts["message"]),

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from landing_cli.observe.covariance import sigma_along
+from landing_cli.observe.path_samples import positions_at
 from landing_cli.observe.records import (
     Clustering,
     InformationOptions,
@@ -16,6 +17,7 @@ from landing_cli.observe.records import (
     Parameter,
     Path,
     SteeringOptions,
+    Waypoints,
 )
 from landing_cli.observe.transcription import least_energy_path
 from landing_cli.observe.visibility import seen_along, unseen_reason
@@ -56,8 +58,9 @@ class Ground:
         None where the control points were given.
     control_points_m : (c, 2) nested tuple, m, site frame x, y
         Inner control points of the waypoints' curve.
-    nodes : int
-        Intervals of the least-energy transcription.
+    ways : tuple of SteeringOptions
+        The paper's method for every number of waypoints that was asked for; also where the path that sees
+        best is searched from.
     """
 
     case: ObserveCase
@@ -66,7 +69,7 @@ class Ground:
     nominal: ObservedPath
     clustering: Clustering | None
     control_points_m: tuple[tuple[float, float], ...]
-    nodes: int
+    ways: tuple[SteeringOptions, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,19 +145,16 @@ def solve_task(ground: Ground, task: ObserveTask) -> Observation:
     parameters: dict[str, Parameter] = dict(ground.gravity)
     waypoints = None
     if isinstance(task.options, SteeringOptions):
-        if task.options.waypoints:
-            waypoints = waypoints_of(case, ground.control_points_m, tof_s, task.options)
+        waypoints = _waypoints(ground, task.options)
         path = least_energy_path(case, tof_s, waypoints, task.options.nodes)
     else:
-        from landing_cli.observe.information import most_informative_path
-
-        start = least_energy_path(case, tof_s, None, ground.nodes)
-        path = most_informative_path(case, ground.nominal.path, start, task.options)
+        path, least = _informed(ground, task.options)
         parameters |= {"weight": task.options.weight, "knots": task.options.knots}
-        parameters["performance_index_ratio"] = path.performance_index_m2_s3 / start.performance_index_m2_s3
+        parameters["performance_index_ratio"] = path.performance_index_m2_s3 / least
     steered = observed(ground.case, path)
     if not steered.seen.distinct:
-        parameters["unseen_because"] = unseen_reason(ground.case, path, steered.seen)
+        where = positions_at(path, steered.seen.t_s)
+        parameters["unseen_because"] = unseen_reason(ground.case, steered.seen, where)
     return Observation(
         objective="energy" if isinstance(task.options, SteeringOptions) else "information",
         nominal=ground.nominal,
@@ -163,6 +163,25 @@ def solve_task(ground: Ground, task: ObserveTask) -> Observation:
         steered=steered,
         parameters=parameters,
     )
+
+
+def _waypoints(ground: Ground, way: SteeringOptions) -> Waypoints | None:
+    if not way.waypoints:
+        return None
+    return waypoints_of(ground.solver_case, ground.control_points_m, ground.nominal.path.tof_s, way)
+
+
+def _informed(ground: Ground, options: InformationOptions) -> tuple[Path, float]:
+    """Return the path that sees best, searched from the paper's paths too, and the least J."""
+    from landing_cli.observe.information import most_informative_path
+
+    case, tof_s = ground.solver_case, ground.nominal.path.tof_s
+    nodes = ground.ways[0].nodes
+    least = least_energy_path(case, tof_s, None, nodes)
+    others = [
+        least_energy_path(case, tof_s, _waypoints(ground, way), nodes) for way in ground.ways if way.waypoints
+    ]
+    return most_informative_path(case, least, options, others), least.performance_index_m2_s3
 
 
 def _timed(ground: Ground, index: int, task: ObserveTask) -> SolvedTask:

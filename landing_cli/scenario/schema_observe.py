@@ -152,21 +152,21 @@ class PriorSection(Section):
 class SteeringSection(Section):
     """The paper's method: waypoints on a Bezier curve towards the clusters of landmarks."""
 
-    waypoints: WaypointCounts = Field((3,), description="waypoints m: a number, or a list of them")
+    waypoints: WaypointCounts = Field(default=(3,), description="waypoints m: a number, or a list of them")
     timing: Literal["paper", "velocity_matched"] = Field(
-        "paper",
+        default="paper",
         description="when the curve is passed: paper (eq 10) | velocity_matched (as the end velocities ask)",
     )
     clusters: int | None = Field(
-        None, ge=1, le=100, description="clusters k; the elbow of the error's curve unless given"
+        default=None, ge=1, le=100, description="clusters k; the elbow of the error's curve unless given"
     )
     clusters_max: int = Field(default=9, ge=3, le=100, description="largest k of the elbow's curve")
     side: Literal["left", "right"] | None = Field(
-        None,
+        default=None,
         description="side of the unsteered path, along its flight; the one with more centres unless given",
     )
     control_points_m: tuple[tuple[float, float], ...] | None = Field(
-        None,
+        default=None,
         min_length=1,
         max_length=30,
         description="inner control points in the order of flight, m, site frame [x, y]; in place of clusters",
@@ -195,7 +195,7 @@ class InformationSection(Section):
     """The path that sees best: J/J0 + weight log(mean position sigma) is least."""
 
     weight: Weights = Field(
-        (0.01, 0.03, 0.1, 0.3, 1.0), description="lambda: a number, or a list of them for a front"
+        default=(0.01, 0.03, 0.1, 0.3, 1.0), description="lambda: a number, or a list of them for a front"
     )
     knots: int = Field(default=5, ge=1, le=100, description="inner spline knots, free in space")
 
@@ -222,9 +222,9 @@ class ObserveSection(Section):
     tof_search_s: tuple[Seconds, Seconds] = Field(
         (60.0, 3600.0), description="where search looks, s: [shortest, longest]"
     )
-    gravity: Literal["body", "interpolated"] = Field(
+    gravity: Literal["body", "polyhedron", "interpolated"] = Field(
         "body",
-        description="field: body (body.gravity itself) | interpolated (fitted to it, its error stored)",
+        description="field: body (body.gravity) | polyhedron (the mesh's) | interpolated (fitted to that)",
     )
     clearance_m: Metres | None = Field(
         None, description="distance to the terrain kept outside the ball about the site, m; none unless given"

@@ -31,15 +31,27 @@ def costs_figure(entries: Sequence[ObservationEntry]) -> Figure:
     steered = sorted((entry for entry in entries if entry.observation.objective == "energy"), key=_waypoints)
     names = [str(_waypoints(entry)) for entry in steered]
     paths = [entry.observation.steered for entry in steered]
+
+    def paths_of(quantity: str, scale: float) -> list[float]:
+        return [scale * getattr(p.path, quantity) for p in paths]
+
     figure = plotting.new_figure(10.0, 4.4)
     plotting.add_title(figure, title_of(entries), facts_of(entries[0].case))
     left, right = (figure.add_axes((0.08 + 0.5 * i, 0.15, 0.36, 0.63)) for i in range(2))
-    _bars(left, names, [100 * p.path.propellant_mass_fraction for p in paths], plotting.BLUE)
-    left.set(ylabel="propellant mass fraction (%)", title="a  propellant (bars) and J (points)")
-    _points(left, names, [1e3 * p.path.performance_index_m2_s3 for p in paths], "J (10⁻³ m²/s³)")
-    _bars(right, names, [p.seen.mean_in_view for p in paths], plotting.GREEN)
-    right.set(ylabel="landmarks in view, mean", title="b  in view at a time (bars) and distinct (points)")
-    _points(right, names, [p.seen.distinct for p in paths], "distinct landmarks seen")
+    _pair(
+        left,
+        names,
+        (paths_of("propellant_mass_fraction", 100.0), "propellant mass fraction (%)", plotting.BLUE),
+        (paths_of("performance_index_m2_s3", 1e3), "J (10⁻³ m²/s³)", plotting.RED),
+    )
+    left.set_title("a  what it costs")
+    _pair(
+        right,
+        names,
+        ([p.seen.mean_in_view for p in paths], "landmarks in view, mean", plotting.GREEN),
+        ([float(p.seen.distinct) for p in paths], "distinct landmarks seen", plotting.PURPLE),
+    )
+    right.set_title("b  what it brings")
     return figure
 
 
@@ -111,15 +123,13 @@ def _waypoints(entry: ObservationEntry) -> int:
     return 0 if waypoints is None else len(waypoints.t_s)
 
 
-def _bars(axes: Axes, names: Sequence[str], values: Sequence[float], colour: str) -> None:
-    axes.bar(range(len(names)), values, color=colour, alpha=0.45, width=0.6)
-    axes.set_xticks(range(len(names)), names)
-    axes.set(xlabel="waypoints m")
-
-
-def _points(axes: Axes, names: Sequence[str], values: Sequence[float], label: str) -> None:
-    """Mark a second quantity on an axis of its own."""
+def _pair(axes: Axes, names: Sequence[str], *series: tuple[Sequence[float], str, str]) -> None:
+    """Draw two quantities over the number of waypoints, each on an axis of its own colour."""
     other = axes.twinx()
     other.spines["right"].set_visible(True)
-    other.plot(range(len(names)), values, color=plotting.RED, marker="o", lw=1.0)
-    other.set(ylabel=label, ylim=(0.0, 1.1 * max([*values, 1e-12])))
+    for panel, (values, label, colour), marker in zip((axes, other), series, "so", strict=True):
+        panel.plot(range(len(names)), values, color=colour, marker=marker, lw=1.2)
+        panel.set_ylabel(label, color=colour)
+        panel.margins(x=0.1, y=0.15)
+    axes.set_xticks(range(len(names)), names)
+    axes.set_xlabel("waypoints m")

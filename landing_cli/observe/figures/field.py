@@ -61,7 +61,7 @@ def _draw_elbow(axes: Axes, clustering: Clustering) -> None:
         axes.plot(counts[ends], clustering.sse_m2[ends], color=plotting.GREY, lw=0.9, label="chord")
     if k <= len(counts):
         axes.plot(k, clustering.sse_m2[k - 1], **{**SITE, "markersize": 8})
-    axes.set(xlabel="clusters k", ylabel="squared errors $I_{SSE}$ (m²)", ylim=(0.0, None))
+    axes.set(xlabel="clusters k", ylabel="squared errors $I_{SSE}$ (m²)", yscale="log")
     how = "the elbow" if clustering.chosen_by == "elbow" else "given"
     axes.set_title(f"a  k = {k}: {how}")
     axes.grid(True)

@@ -97,7 +97,8 @@ def told_of(observed: ObservedPath) -> str:
     path, seen, sigma = observed.path, observed.seen, observed.sigma
     count = seen.visible.shape[1]
     return (
-        f"J {path.performance_index_m2_s3:.5g} m²/s³, {100 * path.propellant_mass_fraction:.3g} % propellant; "
+        f"J {path.performance_index_m2_s3:.5g} m²/s³, "
+        f"{100 * path.propellant_mass_fraction:.3g} % propellant; "
         f"sees {seen.distinct} of {count}, {seen.mean_in_view:.2f} at a time, "
         f"none for {seen.longest_gap_s:.4g} s; "
         f"mean position sigma {sigma.mean_m:.3g} m"
