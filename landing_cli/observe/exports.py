@@ -150,8 +150,7 @@ def landmarks_table(entries: Sequence[ObservationEntry]) -> Table:
     ):
         columns |= {f"{name}_{axis}": TableColumn(values[:, i]) for i, axis in enumerate("xyz")}
     columns |= {"diameter_m": TableColumn(landmarks.diameter_m), "facet": TableColumn(landmarks.facet)}
-    if first.clustering is not None:
-        columns["cluster"] = TableColumn(first.clustering.label)
+    columns["cluster"] = TableColumn(first.clustering.label)
     views = {"nominal": first.nominal, **{entry.name: entry.observation.steered for entry in entries}}
     for name, observed in views.items():
         columns[f"in_view_{name}"] = TableColumn(observed.seen.visible.mean(axis=0))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from landing_cli import __version__
 from landing_cli.compile_cache import is_cached
+from landing_cli.errors import InputRefused
 from landing_cli.flight.acceleration_control import natural_accelerations
 from landing_cli.observe.cases import observe_case
 from landing_cli.observe.clusters import cluster
@@ -46,6 +47,7 @@ from landing_cli.results.provenance import Stopwatch
 from landing_cli.results.store import read
 from landing_cli.scenario.build import build
 from landing_cli.scenario.load import LoadedScenario
+from landing_cli.scenario.messages import Problem, refusal
 from landing_cli.scenario.schema_observe import ObserveSection
 from landing_cli.scenario.sections import for_mission, observe_section
 from landing_cli.scenario.show import to_yaml
@@ -218,15 +220,23 @@ def ground_of(request: Request) -> Ground:
     Returns
     -------
     Ground
+
+    Raises
+    ------
+    InputRefused
+        The number of clusters or the side that was asked contradicts the landmarks.
     """
     section, case = observe_section(request.loaded), request.case
     solver_case, gravity = _solver_case(section, case)
     nominal = observed(case, nominal_path(solver_case))
     ways = steering_of(section)
     given = section.steering.control_points_m
-    clustering = cluster(case, nominal.path, ways[0]) if given is None else None
-    points = given if clustering is None else _pairs(clustering.control_points_m)
-    assert points is not None
+    try:
+        clustering = cluster(case, nominal.path, ways[0])
+    except InputRefused as error:  # the options contradict the landmarks
+        problem = Problem((MISSION, *error.where.split(".")), error.what, error.fix)
+        raise refusal([problem], request.loaded.places, request.loaded.source) from error
+    points = _pairs(clustering.control_points_m) if given is None else given
     return Ground(case, solver_case, gravity, nominal, clustering, points, ways)
 
 

@@ -451,8 +451,8 @@ class Observation:
     objective : {"energy", "information"}
     nominal : ObservedPath
         The energy-optimal law flown closed loop.
-    clustering : Clustering or None
-        None where the control points were given, or the objective needs none.
+    clustering : Clustering
+        Of the landmarks; control points that were given take the place of its own.
     waypoints : Waypoints or None
         None under the information objective.
     steered : ObservedPath
@@ -462,7 +462,7 @@ class Observation:
 
     objective: Objective
     nominal: ObservedPath
-    clustering: Clustering | None
+    clustering: Clustering
     waypoints: Waypoints | None
     steered: ObservedPath
     parameters: Mapping[str, Parameter] = field(default_factory=dict)

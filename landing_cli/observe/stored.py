@@ -104,7 +104,7 @@ def observation_to_arrays(observation: Observation, cpu_s: float) -> Arrays:
 
 
 def observation_from_arrays(
-    arrays: Mapping[str, NDArray[Any]], nominal: ObservedPath, clustering: Clustering | None
+    arrays: Mapping[str, NDArray[Any]], nominal: ObservedPath, clustering: Clustering
 ) -> tuple[Observation, float]:
     """Decode what ``observation_to_arrays`` encoded.
 
@@ -114,7 +114,7 @@ def observation_from_arrays(
         A journal record.
     nominal : ObservedPath
         Of the run.
-    clustering : Clustering or None
+    clustering : Clustering
         Of the run.
 
     Returns
@@ -158,8 +158,7 @@ def run_to_tree(run: ObserveRun) -> Group:
     Returns
     -------
     Group
-        With the groups ``body``, ``spacecraft``, ``asked``, ``nominal``, ``clusters`` where there are any,
-        and ``cases``.
+        With the groups ``body``, ``spacecraft``, ``asked``, ``nominal``, ``clusters`` and ``cases``.
     """
     first = run.cases[0]
     craft = {name: value for name, value in vars(run.spacecraft).items() if value is not None}
@@ -169,10 +168,9 @@ def run_to_tree(run: ObserveRun) -> Group:
         "spacecraft": Group({}, craft),
         "asked": case_to_group(first.case),
         "nominal": Group(observed_to_members(nominal), observed_facts(nominal)),
+        "clusters": clustering_to_group(first.observation.clustering),
         "cases": Group({entry.name: _entry_to_group(entry, order) for order, entry in enumerate(run.cases)}),
     }
-    if first.observation.clustering is not None:
-        members["clusters"] = clustering_to_group(first.observation.clustering)
     return Group(members, {"mission": MISSION})
 
 
@@ -210,9 +208,7 @@ def _run_from_tree(tree: Group, cpu: Any) -> ObserveRun:
     case = case_from_group(tree.group("asked"), asteroid, craft)
     nominal = observed_from_group(tree.group("nominal"))
     count = len(case.landmarks.position_m)
-    clustering = None
-    if "clusters" in tree.members:
-        clustering = clustering_from_group(tree.group("clusters"), count)
+    clustering = clustering_from_group(tree.group("clusters"), count)
     groups = {name: tree.group("cases", name) for name in tree.group("cases").members}
     ordered = sorted(groups, key=lambda name: number(groups[name], "order"))
     if not ordered:
@@ -243,9 +239,7 @@ def _entry_to_group(entry: ObservationEntry, order: int) -> Group:
     return Group(members, facts)
 
 
-def _observation_from_group(
-    group: Group, nominal: ObservedPath, clustering: Clustering | None
-) -> Observation:
+def _observation_from_group(group: Group, nominal: ObservedPath, clustering: Clustering) -> Observation:
     waypoints = None
     if "waypoints" in group.members:
         stored = group.group("waypoints")

@@ -50,17 +50,16 @@ def summarise(entry: ObservationEntry) -> dict[str, Any]:
             "waypoint_m": waypoints.position_m,
             "curve_m": waypoints.curve_m,
         }
-    if clusters is not None:
-        told["clusters"] = {
-            "k": len(clusters.center_m),
-            "k_chosen_by": clusters.chosen_by,
-            "center_m": clusters.center_m,
-            "side": ["left" if side > 0 else "right" for side in clusters.side],
-            "steered_to": clusters.steered_to,
-            "side_chosen_by": clusters.side_chosen_by,
-            "control_points_m": clusters.control_points_m,
-            "sse_m2": clusters.sse_m2,
-        }
+    told["clusters"] = {
+        "k": len(clusters.center_m),
+        "k_chosen_by": clusters.chosen_by,
+        "center_m": clusters.center_m,
+        "side": ["left" if side > 0 else "right" for side in clusters.side],
+        "steered_to": clusters.steered_to,
+        "side_chosen_by": clusters.side_chosen_by,
+        "control_points_m": clusters.control_points_m,
+        "sse_m2": clusters.sse_m2,
+    }
     return told | {key: value for key, value in observation.parameters.items() if key not in told}
 
 

@@ -54,8 +54,8 @@ class Ground:
         What is to be said of that gravity, JSON-ready.
     nominal : ObservedPath
         The unsteered path; its time of flight is everybody's.
-    clustering : Clustering or None
-        None where the control points were given.
+    clustering : Clustering
+        Of the landmarks.
     control_points_m : (c, 2) nested tuple, m, site frame x, y
         Inner control points of the waypoints' curve.
     ways : tuple of SteeringOptions
@@ -67,7 +67,7 @@ class Ground:
     solver_case: ObserveCase
     gravity: Mapping[str, Parameter]
     nominal: ObservedPath
-    clustering: Clustering | None
+    clustering: Clustering
     control_points_m: tuple[tuple[float, float], ...]
     ways: tuple[SteeringOptions, ...]
 

@@ -59,8 +59,7 @@ def _figures(entries: tuple[ObservationEntry, ...], prefix: str) -> Iterator[tup
     from landing_cli.observe.figures.paths import paths_figure
 
     yield f"{prefix}paths", paths_figure(entries)
-    if entries[0].observation.clustering is not None:
-        yield f"{prefix}clusters", field_figure(entries)
+    yield f"{prefix}clusters", field_figure(entries)
     for entry in entries:
         yield f"{entry.name}-map", map_figure(entry)
     yield f"{prefix}sight", sight_figure(entries)

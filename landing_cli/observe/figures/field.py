@@ -37,14 +37,13 @@ def field_figure(entries: Sequence[ObservationEntry]) -> Figure:
     Parameters
     ----------
     entries : sequence of ObservationEntry
-        Of one run that found clusters.
+        Of one run, at least one.
 
     Returns
     -------
     Figure
     """
     clustering = entries[0].observation.clustering
-    assert clustering is not None
     figure = plotting.new_figure(10.4, 5.6)
     plotting.add_title(figure, title_of(entries), facts_of(entries[0].case))
     _draw_elbow(figure.add_axes((0.07, 0.17, 0.33, 0.66)), clustering)
@@ -81,9 +80,10 @@ def _draw_clusters(axes: Axes, entries: Sequence[ObservationEntry], clustering: 
         *site_points(case, entries[0].observation.nominal)[:, :2].T, **UNSTEERED, label="unsteered path"
     )
     curves = [e.observation.waypoints.curve_m for e in entries if e.observation.waypoints is not None]
+    control = curves[0][1:-1] if curves else clustering.control_points_m
     if curves:
         axes.plot(*bezier(curves[0]).T, **CURVE, label="Bezier curve")
-    axes.plot(*clustering.control_points_m.T, **CONTROL, label="control points")
+    axes.plot(*control.T, **CONTROL, label="control points")
     axes.plot(*case.frame.to_site(case.position_m)[:2, None], **START, label="initial position")
     axes.plot(0.0, 0.0, **SITE, label="site")
     low, high = scene_box(entries)
