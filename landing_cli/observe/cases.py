@@ -19,7 +19,6 @@ from landing_cli.observe.features import ThomasField, placed_landmarks, thomas_l
 from landing_cli.observe.illumination import heliocentric_position_m, sun_direction
 from landing_cli.observe.landmark_source import landmarks_path
 from landing_cli.observe.records import Landmarks, ObserveCase, Prior, Sensor, SiteFrame
-from landing_cli.observe.site_frame import site_frame
 from landing_cli.scenario.build import KeyRefused
 from landing_cli.scenario.landmark_document import read_landmarks
 from landing_cli.scenario.load import LoadedScenario
@@ -61,7 +60,7 @@ def observe_case(loaded: LoadedScenario, asteroid: Asteroid, spacecraft: Spacecr
     surface = build_surface_index(asteroid.mesh)
     try:
         site = site_of(section.site, ("observe", "site"), asteroid.mesh, surface)
-        frame = site_frame(site.position_m, site.normal, section.frame, site.facet)
+        frame = _frame(section, site)
         position, velocity = _start(section, frame, surface)
         landmarks = _landmarks(loaded, section, asteroid, surface, frame)
     except KeyRefused as error:
@@ -140,6 +139,13 @@ def sun_of(body: Body) -> FloatArray | None:
     )
     angles = (body.pole.ra_deg, body.pole.dec_deg, body.pole.w0_deg)
     return sun_direction(position, *map(math.radians, angles))
+
+
+def _frame(section: ObserveSection, site: Site) -> SiteFrame:
+    try:
+        return site_frame(site.position_m, site.normal, section.frame, site.facet)
+    except InputRefused as error:
+        raise KeyRefused(("observe", "frame"), error.what, error.fix) from error
 
 
 def _start(section: ObserveSection, frame: SiteFrame, surface: SurfaceIndex) -> tuple[FloatArray, FloatArray]:
