@@ -14,11 +14,14 @@ from landing_cli.body.bvh import SurfaceIndex, build_surface_index
 from landing_cli.body.clearance import signed_distances
 from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.polyhedron import polyhedron_field
+from landing_cli.body.landing_site import Site
+from landing_cli.errors import InputRefused
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.observe.features import ThomasField, placed_landmarks, thomas_landmarks
 from landing_cli.observe.illumination import heliocentric_position_m, sun_direction
 from landing_cli.observe.landmark_source import landmarks_path
 from landing_cli.observe.records import Landmarks, ObserveCase, Prior, Sensor, SiteFrame
+from landing_cli.observe.site_frame import site_frame
 from landing_cli.scenario.build import KeyRefused
 from landing_cli.scenario.landmark_document import read_landmarks
 from landing_cli.scenario.load import LoadedScenario
