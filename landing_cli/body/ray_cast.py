@@ -12,7 +12,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _PAD = 1e-12  # of a box's coordinates: what rounding may cut off a box without thickness
-_ROUNDING = 16 * 2.0**-53  # of the products in a volume: more than six roundings each
+_ROUNDING = 16 * 2.0**-53  # of a coordinate, or of the products in a volume: more than six roundings each
 
 
 def first_hits(
@@ -95,7 +95,7 @@ def _triangle_hit(t: FloatArray, ox: float, oy: float, oz: float, dx: float, dy:
 
     By the signs of the volumes of d with each edge, as seen from o (Pluecker's test; Segura and Feito, WSCG
     1998). A volume within rounding of zero counts for the facets on both sides, so that no ray slips through
-    an edge or a corner. A ray in the facet's plane does not meet it.
+    an edge or a corner. A ray that rounding cannot tell from one in the facet's plane does not meet it.
     """
     ax, ay, az = t[0] - ox, t[1] - oy, t[2] - oz
     bx, by, bz = t[3] - ox, t[4] - oy, t[5] - oz
@@ -108,7 +108,7 @@ def _triangle_hit(t: FloatArray, ox: float, oy: float, oz: float, dx: float, dy:
     if min(ab, bc, ca) < -zero and max(ab, bc, ca) > zero:
         return np.nan
     along = dx * t[9] + dy * t[10] + dz * t[11]
-    if along == 0.0 or max(abs(ab), abs(bc), abs(ca)) <= zero:
+    if abs(along) <= _ROUNDING * (abs(ox) + abs(oy) + abs(oz) + max(a, b, c)):
         return np.nan
     return (ax * t[9] + ay * t[10] + az * t[11]) / along
 

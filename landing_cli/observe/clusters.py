@@ -179,18 +179,15 @@ def side_and_way(track_m: FloatArray, points_m: FloatArray) -> tuple[IntArray, F
     begins = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
     offsets = points_m[:, None] - track_m[:-1]
     way = np.einsum("ksi,si->ks", offsets, unit)
-    foot = track_m[:-1] + np.clip(way, 0.0, lengths)[:, :, None] * unit
+    share = np.clip(way / lengths, 0.0, 1.0)[:, :, None]
+    foot = (1.0 - share) * track_m[:-1] + share * track_m[1:]  # a corner is the same point for both segments
     nearest = np.argmin(np.linalg.norm(points_m[:, None] - foot, axis=2), axis=1)
-    rows, last = np.arange(len(points_m)), len(steps) - 1
-    here = way[rows, nearest]
-    before = (here < 0.0) & (nearest > 0)
-    after = (here > lengths[nearest]) & (nearest < last)
-    direction = unit[nearest] + np.where(before[:, None], unit[np.maximum(nearest - 1, 0)], 0.0)
-    direction = direction + np.where(after[:, None], unit[np.minimum(nearest + 1, last)], 0.0)
-    corner = track_m[nearest + after]
-    away = points_m - corner
+    here, last = way[np.arange(len(points_m)), nearest], len(steps) - 1
+    at_corner = (here >= lengths[nearest]) & (nearest < last)
+    direction = unit[nearest] + np.where(at_corner[:, None], unit[np.minimum(nearest + 1, last)], 0.0)
+    away = points_m - track_m[nearest]
     across = direction[:, 0] * away[:, 1] - direction[:, 1] * away[:, 0]
-    here = np.where(before, 0.0, np.where(after, lengths[nearest], here))
+    here = np.where(at_corner, lengths[nearest], here)
     return np.where(across >= 0.0, 1, -1).astype(np.int64), begins[nearest] + here
 
 

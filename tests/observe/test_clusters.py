@@ -92,17 +92,21 @@ def test_sides_follow_the_nearest_part_of_a_bent_track():
     np.testing.assert_allclose(same, way, atol=1e-12)
 
 
-def test_a_sharp_corner_is_decided_by_both_its_segments():
-    """Beyond the tip of a 20 deg wedge, the two produced segments disagree; outside is outside."""
-    tip, half = np.array([100.0, 0.0]), np.radians(10.0)
+@pytest.mark.parametrize("turned", np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False))
+def test_a_sharp_corner_is_decided_by_both_its_segments(turned):
+    """Beyond the tip of a 20 deg wedge, the two produced segments disagree; outside is outside.
+
+    Rounding makes either segment the nearer one, turn by turn.
+    """
+    half = np.radians(10.0)
     back = 100.0 * np.array([np.cos(half), np.sin(half)])
-    track = np.array([tip - back, tip, tip - back * [1, -1]])
-    beyond = np.array([[105.0, 0.5], [105.0, -0.5], [105.0, 0.0]])
-    assert side_and_way(track, beyond)[0].tolist() == [-side_of_inside(track)] * 3
-
-
-def side_of_inside(track: np.ndarray) -> int:
-    return int(side_and_way(track, np.array([[60.0, 0.0]]))[0][0])
+    track = np.array([-back, [0.0, 0.0], -back * [1, -1]])
+    points = np.array([[-40.0, 0.0], [5.0, 5.0], [5.0, -5.0], [5.0, 0.0], [-30.0, 20.0], [-30.0, -20.0]])
+    turn = np.array([[np.cos(turned), np.sin(turned)], [-np.sin(turned), np.cos(turned)]])
+    away = np.array([1234.5, -87.6])
+    side, way = side_and_way(track @ turn + away, points @ turn + away)
+    assert side.tolist() == [1, -1, -1, -1, -1, -1]
+    np.testing.assert_allclose(way[1:4], 100.0, rtol=1e-12)
 
 
 def test_steps_without_direction_are_dropped():
@@ -117,14 +121,16 @@ def field(centers: list[tuple[float, float]], count: int = 12, seed: int = 0) ->
     return np.concatenate([np.array(center) + rng.normal(0.0, 4.0, (count, 2)) for center in centers])
 
 
-def test_control_points_are_the_centres_of_the_richer_side_in_the_order_of_flight():
-    points = field([(1.9, 21.9), (-28.7, 71.9), (-40.0, -30.0)])
-    track = np.linspace(PAPER_START, (0.0, 0.0), 60)
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_control_points_are_the_centres_of_the_richer_side_in_the_order_of_flight(mirror):
+    points = field([(1.9, 21.9), (-28.7, 71.9), (-40.0, -30.0)]) * [mirror, 1.0]
+    track = np.linspace(PAPER_START, (0.0, 0.0), 60) * [mirror, 1.0]
     found = clustered(points, track)
     assert len(found.center_m) == 3 and found.chosen_by == "elbow" and len(found.sse_m2) == 9
     assert (np.diff(found.sse_m2) < 0).all()
-    assert found.side.tolist() == [-1, 1, 1]
-    assert (found.steered_to, found.side_chosen_by) == ("left", "more_centers")
+    assert found.side.tolist() == ([-1, 1, 1] if mirror > 0 else [-1, -1, 1])
+    assert found.steered_to == ("left" if mirror > 0 else "right")
+    assert found.side_chosen_by == "more_centers"
     expected = [points[12:24].mean(axis=0), points[:12].mean(axis=0)]
     np.testing.assert_allclose(found.control_points_m, expected, rtol=1e-12)
     assert np.bincount(found.label).tolist() == [12, 12, 12]

@@ -36,6 +36,8 @@ def test_a_thomas_process_has_its_moments():
     steps = np.diff(points, axis=0)
     same = np.abs(steps).max(axis=1) < 50.0  # consecutive ones of one cluster
     assert steps[same].std() == pytest.approx(2.0 * np.sqrt(2.0), rel=0.03)
+    counts = np.diff(np.flatnonzero(np.concatenate([[True], ~same, [True]])))
+    assert counts.std() == pytest.approx(2.2, rel=0.05)  # of a Poisson number that is not zero
     parents = points[np.concatenate([[True], ~same])]
     assert np.abs(parents).max() < 1e6 + 20.0
     assert parents.std(axis=0) == pytest.approx(1e6 / np.sqrt(3.0), rel=0.05)

@@ -7,7 +7,7 @@ import pytest
 from shape_helpers import box, fibonacci_ellipsoid
 
 from landing_cli.body.bvh import build_surface_index
-from landing_cli.body.mesh import Mesh
+from landing_cli.body.mesh import Mesh, facet_centroids, facet_normals
 from landing_cli.body.ray_cast import first_hits, is_obstructed
 from landing_cli.sources.shape_files import read_mesh
 
@@ -81,6 +81,31 @@ def test_the_offset_frees_the_ends_and_nothing_else():
     starts, ends = np.array([top, top, above, top]), np.array([above, below, below, beside])
     assert is_obstructed(surface, starts, ends, 0.05).tolist() == [False, True, True, False]
     assert is_obstructed(surface, ends, starts, 0.05).tolist() == [False, True, True, False]
+
+
+def test_a_convex_body_hides_no_facet_that_faces_the_eye():
+    mesh = fibonacci_ellipsoid((300.0, 200.0, 150.0), 400)
+    surface = build_surface_index(mesh)
+    rng = np.random.default_rng(6)
+    eyes = rng.normal(size=(len(mesh.faces), 3))
+    eyes *= 700.0 / np.linalg.norm(eyes, axis=1, keepdims=True)
+    marks = facet_centroids(mesh)
+    cosine = ((eyes - marks) * facet_normals(mesh)).sum(axis=1) / np.linalg.norm(eyes - marks, axis=1)
+    faces, clear_of_edge = cosine > 0.0, np.abs(cosine) > 0.01
+    for one, other in ((marks, eyes), (eyes, marks)):
+        hidden = is_obstructed(surface, one, other, 0.05)
+        np.testing.assert_array_equal(hidden[clear_of_edge], ~faces[clear_of_edge])
+
+
+def test_a_line_along_a_face_does_not_meet_it():
+    """Whatever rounding makes of a direction in the plane of a turned box's top."""
+    turn = np.linalg.qr(np.random.default_rng(7).normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    mesh = Mesh(box((2.0, 3.0, 4.0)).vertices @ turn, box((2.0, 3.0, 4.0)).faces)
+    rng = np.random.default_rng(8)
+    ends = np.concatenate([rng.uniform([0.1, 0.1], [1.9, 2.9], (4000, 2)), np.full((4000, 1), 4.0)], axis=1)
+    starts, ends = (ends @ turn).reshape(2, -1, 3)
+    assert not is_obstructed(build_surface_index(mesh), starts, ends, 1e-3).any()
 
 
 def test_obstruction_is_a_hit_within_the_segment(body):
