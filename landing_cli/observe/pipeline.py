@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli import __version__
+from landing_cli.body.ray_cast import obstructed_into
 from landing_cli.compile_cache import is_cached
 from landing_cli.errors import InputRefused
-from landing_cli.flight.acceleration_control import natural_accelerations
 from landing_cli.observe.cases import observe_case
 from landing_cli.observe.clusters import cluster
 from landing_cli.observe.landmark_source import with_landmarks_hash
@@ -195,7 +195,7 @@ def run(
     if journal is None:
         return Outcome(run_from_result(read(output)), up_to_date=True, lost={})
     with journal:
-        if not is_cached(natural_accelerations):
+        if not is_cached(obstructed_into):
             say(COMPILING)
         ground = ground_of(request)
         solved, lost = _solve(request, ground, journal, options, progress)
