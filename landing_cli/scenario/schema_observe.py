@@ -11,6 +11,7 @@ from landing_cli.scenario.schema_plan import SiteSection
 
 Angle = Annotated[float, Field(gt=0, le=180)]
 Metres = Annotated[float, Field(ge=0, le=1e6)]
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 WaypointCount = Annotated[int, Field(ge=0, le=199)]
 Weight = Annotated[float, Field(ge=0, le=1e3)]
 
@@ -165,7 +166,7 @@ class SteeringSection(Section):
         default=None,
         description="side of the unsteered path, along its flight; the one with more centres unless given",
     )
-    control_points_m: tuple[tuple[float, float], ...] | None = Field(
+    control_points_m: tuple[tuple[Coordinate, Coordinate], ...] | None = Field(
         default=None,
         min_length=1,
         max_length=30,
