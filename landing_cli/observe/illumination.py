@@ -24,15 +24,6 @@ def is_light_needed(sensor: Sensor, sun_direction: FloatArray | None) -> bool:
     return sensor.kind == "camera" and sun_direction is not None
 
 
-def illumination_note(sensor: Sensor, sun_direction: FloatArray | None) -> str:
-    """Say in a few words whether illumination is tested, and why not."""
-    if sensor.kind == "lidar":
-        return "off: a lidar brings its own light"
-    if sun_direction is None:
-        return "off: the scenario gives no direction of the sun"
-    return "on"
-
-
 def sun_directions(sun_direction: ArrayLike, rotation_rate_rad_s: float, t_s: ArrayLike) -> FloatArray:
     """Direction of the sun in the body frame as the body turns.
 

@@ -52,8 +52,3 @@ def site_frame(origin_m: ArrayLike, normal: ArrayLike, kind: FrameKind, facet: i
         )
     x = east / length
     return SiteFrame(origin, np.stack([x, np.cross(z, x), z]), kind, facet, outward)
-
-
-def height_above_facet_m(frame: SiteFrame, position_m: ArrayLike) -> float:
-    """Height of a position (3,), m, body frame, above the plane of the site's facet, m; negative below it."""
-    return float((np.asarray(position_m, dtype=np.float64) - frame.origin_m) @ frame.normal)

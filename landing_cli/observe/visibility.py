@@ -231,7 +231,8 @@ def _passes(
         return sunlit_lines(case, t_s, wanted)
     lines, distance = _lines(case, position_m)
     if reason == "range":
-        return np.asarray((distance >= sensor.range_min_m) & (distance <= sensor.range_max_m))
+        known = distance > 0.0  # on the landmark itself there is no direction to it
+        return np.asarray(known & (distance >= sensor.range_min_m) & (distance <= sensor.range_max_m))
     if reason == "field_of_view":
         ahead = -np.einsum("tnk,tk->tn", lines, boresights(sensor, case.frame, position_m))
         return np.asarray(ahead >= distance * math.cos(sensor.half_field_of_view_rad))

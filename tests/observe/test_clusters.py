@@ -6,13 +6,17 @@ import itertools
 
 import numpy as np
 import pytest
-from seeing_samples import landmarks_at, observe_case, path_through
+from seeing_samples import landmarks_at, path_through
+from seeing_samples import observe_case as sample_case
 from shape_helpers import box
 
 from landing_cli.errors import InputRefused
+from landing_cli.observe.cases import observe_case
 from landing_cli.observe.clusters import cluster, elbow, k_means, projected, side_and_way
 from landing_cli.observe.features import ThomasField, thomas_points
 from landing_cli.observe.records import Clustering, SteeringOptions
+from landing_cli.scenario.build import build
+from landing_cli.scenario.load import load
 
 PAPER_START = (-60.0, 70.0)
 TABLE_CENTERS = np.array([[-28.67, 71.88], [1.92, -21.90]])
@@ -23,7 +27,7 @@ PLANE = box((400.0, 400.0, 400.0), (-200.0, -200.0, -200.0))
 def clustered(points: np.ndarray, track: np.ndarray, **options: object) -> Clustering:
     """Cluster landmarks of the face x = 200 of a cube: the site frame's x is +y there, its y is +z."""
     where = np.column_stack([np.full(len(points), 200.0), points])
-    case = observe_case(PLANE, landmarks_at(PLANE, where), [200.0, 0.0, 0.0])
+    case = sample_case(PLANE, landmarks_at(PLANE, where), [200.0, 0.0, 0.0])
     corners = np.column_stack([np.linspace(300.0, 200.0, len(track)), track])
     path = path_through(np.linspace(0.0, 100.0, len(track)), corners)
     return cluster(case, path, SteeringOptions(**options))  # type: ignore[arg-type]
@@ -69,6 +73,16 @@ def test_the_elbow_counts_random_fields_of_three_clusters():
         points = thomas_points(ThomasField(seed, 3, 12.0, 8.0, 100.0))
         found.append(elbow(np.array([k_means(points, k)[2] for k in range(1, 10)])))
     assert found.count(3) == 57
+
+
+@pytest.mark.parametrize("name", ["eros", "published/shen2026-eros"])
+def test_the_shipped_fields_have_three_clusters(project_root, reference_shapes, monkeypatch, name):
+    monkeypatch.setenv("LANDING_REFERENCE_DATA", str(reference_shapes.parent))
+    loaded = load(str(project_root / "configs" / f"{name}.yaml"))
+    built = build(loaded)
+    case = observe_case(loaded, built.asteroid, built.spacecraft)
+    points = np.ascontiguousarray(case.frame.to_site(case.landmarks.position_m)[:, :2])
+    assert elbow(np.array([k_means(points, k)[2] for k in range(1, 10)])) == 3
 
 
 def test_the_paper_table_has_its_centres_on_opposite_sides():

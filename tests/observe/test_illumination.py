@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
+from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from seeing_samples import sensor
 
 from landing_cli.observe.illumination import (
     GM_SUN_M3_S2,
     OBLIQUITY_RAD,
     body_axes,
     heliocentric_position_m,
-    illumination_note,
     sun_direction,
     sun_directions,
 )
@@ -94,8 +93,22 @@ def test_the_earth_at_the_march_equinox():
     assert np.linalg.norm(position) == pytest.approx(0.99597 * AU_M, rel=1e-3)
 
 
-def test_what_is_said_of_illumination():
-    sun = np.array([1.0, 0.0, 0.0])
-    assert illumination_note(sensor(), sun) == "on"
-    assert illumination_note(sensor(), None) == "off: the scenario gives no direction of the sun"
-    assert illumination_note(sensor(kind="lidar"), sun) == "off: a lidar brings its own light"
+def test_the_seasons_of_eros_were_those_that_near_saw():
+    """Autumn began in the north on 2000-06-25, and around 2001-02-01 the sun stood over the south pole.
+
+    Elements of the Minor Planet Center for 2019-07-02, pole of the IAU's report (11.35, 17.22 deg).
+    """
+    angles = [math.radians(value) for value in (10.82858, 304.30424, 178.83549, 84.17190)]
+    epoch = datetime(2019, 7, 2)
+
+    def latitude_deg(day: datetime) -> float:
+        elapsed = (day - epoch).total_seconds()
+        position = heliocentric_position_m(1.4581823 * AU_M, 0.2227385, *angles, elapsed)
+        z = sun_direction(position, math.radians(11.35), math.radians(17.22), 0.0)[2]
+        return math.degrees(math.asin(z))
+
+    assert latitude_deg(datetime(2000, 6, 24)) > 0.0 > latitude_deg(datetime(2000, 6, 26))
+    days = [datetime(2000, 12, 1) + timedelta(days=i) for i in range(120)]
+    least = min(days, key=latitude_deg)
+    assert abs((least - datetime(2001, 2, 1)).days) <= 4
+    assert latitude_deg(least) < -88.0

@@ -146,3 +146,30 @@ def test_other_files_are_refused(tmp_path):
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(InputRefused, match="is a directory"):
         read_landmarks(tmp_path / "folder.csv")
+
+
+@pytest.mark.parametrize("kind", ["csv", "yaml"])
+def test_mutilated_lists_are_read_or_refused_and_never_crash(tmp_path, kind):
+    text = {
+        "csv": 'name,x_m,y_m,z_m,diameter_m\na,1,2.5,-3e2,4\n"b, c",5,6,7,\n',
+        "yaml": "landmarks:\n  - {name: a, position_m: [1, 2.5, -3e2], diameter_m: 4}\n"
+        "  - {lon_deg: 5, lat_deg: 6}\n",
+    }[kind]
+    rng = np.random.default_rng(11)
+    alphabet = b"0159.,-+eE:{}[]&*!|>\"'#\n\r\t\0 \xff\xc3\xa9naxmz_"
+    refused = 0
+    for _ in range(400):
+        data = bytearray(text.encode())
+        for _ in range(rng.integers(1, 4)):
+            at, how = rng.integers(len(data)), rng.integers(3)
+            piece = bytes([alphabet[rng.integers(len(alphabet))]])
+            data[at : at + (how != 0)] = piece if how < 2 else b""
+        try:
+            table = read_landmarks(written(tmp_path, bytes(data), f"marks.{kind}"))
+        except InputRefused as error:
+            refused += 1
+            assert "\n" not in str(error)
+        else:
+            placed = np.isfinite(table.position_m).all(axis=1) ^ np.isfinite(table.latitude_rad)
+            assert placed.all() and len(set(table.name)) == len(table.name)
+    assert 100 < refused < 400

@@ -7,7 +7,7 @@ import pytest
 
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.errors import InputRefused
-from landing_cli.observe.site_frame import height_above_facet_m, site_frame
+from landing_cli.observe.site_frame import site_frame
 from landing_cli.sources.shape_files import read_mesh
 
 SITE, NORMAL = np.array([3000.0, 4000.0, 1200.0]), np.array([0.0, 3.0, 4.0])
@@ -34,12 +34,6 @@ def test_positions_there_and_back():
     np.testing.assert_allclose(frame.to_site(SITE), np.zeros(3), atol=0)
     up = frame.to_site(SITE * 1.1)
     np.testing.assert_allclose(up, [0, 0, 0.1 * np.linalg.norm(SITE)], atol=1e-12)
-
-
-def test_height_is_above_the_facet_and_not_along_z():
-    frame = site_frame(SITE, NORMAL, "radial")
-    assert height_above_facet_m(frame, SITE + np.array([17.0, 0.0, 5.0])) == pytest.approx(4.0, rel=1e-12)
-    assert height_above_facet_m(frame, SITE + np.array([0.0, -5.0, 0.0])) == pytest.approx(-3.0, rel=1e-12)
 
 
 @pytest.mark.parametrize(

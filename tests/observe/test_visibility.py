@@ -128,6 +128,13 @@ def test_the_sun_turns_backwards_with_the_body():
     assert sunlit_lines(case, times)[:, 0].tolist() == [False, True, False]
 
 
+def test_a_landmark_on_the_site_is_lost_at_touchdown():
+    case = on_the_table([[0.0, 0.0, 0.0]])
+    found = seen_at(case, np.arange(3.0), np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1e-3], [0.0, 0.0, 0.0]]))
+    assert found.visible[:, 0].tolist() == [True, True, False]
+    assert found.rejected["range"] == 1
+
+
 def test_boresights():
     case = on_the_table([[0.0, 0.0, 0.0]])
     eyes = np.array([[30.0, 0.0, 40.0], [0.0, 0.0, 0.0]])
