@@ -25,11 +25,12 @@ from landing_cli.observe.information_program import (
     spline_flight,
     thrust_along,
     thrust_with_slopes,
+    transitions_along,
 )
 from landing_cli.observe.measurements import hard_sight, information_along
 from landing_cli.observe.path_values import path_of
 from landing_cli.observe.records import InformationOptions, ObserveCase, Path, PathStatus
-from landing_cli.observe.visibility import seen_at
+from landing_cli.observe.visibility import seen_at, sensor_times
 from landing_cli.optimize.cone_program import ConeOptions
 from landing_cli.optimize.curved_program import CurvedSolution, solve_curved_program
 
@@ -38,7 +39,10 @@ FloatArray = NDArray[np.float64]
 SOFTNESS = (0.3, 0.1, 0.03)
 """Widths of the sensor's limits, one after the other: radians about an angle, share of a range."""
 
-_DRIVE = ConeOptions(progress_tol=1e-7, max_rounds=80)
+_CONTINUATION = (0.1, 0.3)  # shares of the weight
+_SAME = 1e-3  # splines this close, in distances from start to site, have come to the same
+_ROUGH = ConeOptions(progress_tol=1e-4, max_rounds=40)
+_FINE = ConeOptions(progress_tol=1e-7, max_rounds=80)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +66,7 @@ class Candidate:
 
     def cost(self, weight: float, energy_unit: float) -> float:
         """J/J0 + lambda log(sigma); infinite where a limit of the case is broken."""
-        if self.solution.violation > _DRIVE.violation_tol:
+        if self.solution.violation > _FINE.violation_tol:
             return math.inf
         return self.energy_m2_s3 / energy_unit + weight * math.log(self.sigma_m)
 
@@ -72,8 +76,9 @@ def most_informative_path(
 ) -> Path:
     """Find the path of least J/J0 + lambda log(mean position sigma).
 
-    From every starting path the program is solved with softer, then harder limits of the sensor; what is
-    hidden by terrain or in the dark is looked up anew each time. The best answer by the true limits is flown.
+    From every starting path, and from the answer to lighter weights, the program is solved with softer, then
+    harder limits of the sensor; what is hidden by terrain or in the dark is looked up anew each time. The
+    best answer by the true limits is flown.
 
     Parameters
     ----------
@@ -121,12 +126,18 @@ def best_spline(
         Quadratic programs solved in all.
     """
     found: list[Candidate] = []
-    for start in starts_m:
-        knots = start
-        for softness in SOFTNESS if weight > 0.0 else SOFTNESS[-1:]:
-            held = held_along(flight, knots, softness)
-            found.append(_solved(flight, held, knots, unit, weight))
-            knots = found[-1].knots_m
+    pool = list(starts_m)
+    if weight > 0.0:  # lighter weights lead to where the heavy one would not get to at once
+        knots = pool[0]
+        for share in _CONTINUATION:
+            held = held_along(flight, knots, SOFTNESS[0])
+            knots = _solved(flight, held, knots, unit, share * weight, _ROUGH).knots_m
+        pool.append(knots)
+    for softness in SOFTNESS if weight > 0.0 else SOFTNESS[-1:]:
+        drive = _FINE if softness == SOFTNESS[-1] else _ROUGH
+        solved = [_solved(flight, held_along(flight, k, softness), k, unit, weight, drive) for k in pool]
+        found += solved
+        pool = _distinct([one.knots_m for one in solved], _SAME * flight.length_m)
     best = min(
         found, key=lambda one: (one.cost(weight, unit.performance_index_m2_s3), one.solution.violation)
     )
@@ -163,21 +174,34 @@ def flown(flight: SplineFlight, best: Candidate, start: Path, rounds: int) -> Pa
     return path_of(case, start.t_s, states[:, :3], states[:, 3:], u, status, message, rounds)
 
 
-def _solved(flight: SplineFlight, held: Held, start: FloatArray, unit: Path, weight: float) -> Candidate:
+def _distinct(splines_m: Sequence[FloatArray], apart_m: float) -> list[FloatArray]:
+    """Splines that are not the same as an earlier one."""
+    kept: list[FloatArray] = []
+    for knots in splines_m:
+        if all(np.abs(knots - other).max() > apart_m for other in kept):
+            kept.append(knots)
+    return kept
+
+
+def _solved(
+    flight: SplineFlight, held: Held, start: FloatArray, unit: Path, weight: float, drive: ConeOptions
+) -> Candidate:
     """Solve one program, and judge its answer by the true limits."""
     J0 = unit.performance_index_m2_s3
     solution = solve_curved_program(
-        information_program(flight, held, start, J0, weight), np.zeros(start.size), _DRIVE
+        information_program(flight, held, start, J0, weight), np.zeros(start.size), drive
     )
     knots = start + flight.length_m * solution.x.reshape(-1, 3)
     J, _, _ = energy(flight, thrust_with_slopes(flight, knots))
-    return Candidate(knots, J, hard_mean_sigma(flight, held, knots), solution)
+    return Candidate(knots, J, hard_mean_sigma(flight, knots), solution)
 
 
-def hard_mean_sigma(flight: SplineFlight, held: Held, knots_m: FloatArray) -> float:
-    """Mean position sigma by the sensor's true limits, m, for inner knots (m, 3), m, body frame."""
-    case, t_s = flight.case, flight.sensor.t_s
-    position = flight.sensor.at(knots_m)[0]
+def hard_mean_sigma(flight: SplineFlight, knots_m: FloatArray) -> float:
+    """Mean position sigma by the sensor's true limits at all its times, m, for inner knots (m, 3), m."""
+    case = flight.case
+    t_s = sensor_times(case.sensor, flight.tof_s)
+    position = flight.samples(t_s).at(knots_m)[0]
     sight = hard_sight(case, seen_at(case, t_s, position).visible)
     told = information_along(sight, position)
-    return float(position_sigmas(case.prior, t_s, held.transitions, told).mean())
+    transitions = transitions_along(flight, knots_m, t_s)
+    return float(position_sigmas(case.prior, t_s, transitions, told).mean())

@@ -20,7 +20,8 @@ from scipy import sparse
 
 from landing_cli.body.clearance import TOUCHDOWN_TOLERANCE_M
 from landing_cli.body.distance_slope import distances_with_slopes
-from landing_cli.body.gravity.field_values import accelerations, gradients
+from landing_cli.body.gravity.field_values import accelerations, accelerations_and_gradients
+from landing_cli.flight.linear_arcs import frame_slopes
 from landing_cli.observe.covariance import mean_sigma_with_slopes, state_transitions
 from landing_cli.observe.measurements import information_along, information_slopes, soft_sight
 from landing_cli.observe.path_samples import positions_at
@@ -38,6 +39,7 @@ REACH = 0.1
 CLEARANCE_MARGIN_M = 0.005
 GLIDE_SLOPE_MARGIN_RAD = 2e-5
 
+_MOST_TIMES = 250  # of the sensor's that the program looks at; each stands for its neighbours
 _SPANS = 16  # at least so many pieces of four Gauss points in the integral of u'u
 _CHECKS = 200  # even samples held against terrain and glide slope
 _BUCKET = 5  # of which share a row
@@ -57,7 +59,9 @@ class SplineFlight:
     share_s : (k,) float, s
         Weights of these in the integral over time; 0 for knots and ends.
     sensor : SplineSamples
-        At the sensor's times.
+        At the sensor's times, or evenly picked ones of them.
+    stands_for : (T,) float
+        How many times of the sensor each of these stands for.
     check : SplineSamples
         At even times between the ends.
     """
@@ -68,6 +72,7 @@ class SplineFlight:
     thrust: SplineSamples
     share_s: FloatArray
     sensor: SplineSamples
+    stands_for: FloatArray
     check: SplineSamples
 
     @property
@@ -122,17 +127,22 @@ def spline_flight(case: ObserveCase, tof_s: float, knots: int) -> SplineFlight:
     nodes, weights = np.polynomial.legendre.leggauss(4)
     half = 0.5 * np.diff(edges)[:, None]
     gauss, share = (edges[:-1, None] + half * (1.0 + nodes)).ravel(), (half * weights).ravel()
+    times = sensor_times(case.sensor, tof_s)
+    picked = np.arange(0, len(times), math.ceil(len(times) / _MOST_TIMES))
+    stands_for = np.diff(np.append(picked, len(times))).astype(np.float64)
     bare = np.concatenate([[0.0], knot_s, [tof_s]])
     ends = case.position_m, case.velocity_m_s, case.frame.origin_m
     thrust, sensor, check = (
-        spline_samples(times, knot_s, tof_s, *ends)
-        for times in (
+        spline_samples(t_s, knot_s, tof_s, *ends)
+        for t_s in (
             np.concatenate([gauss, bare]),
-            sensor_times(case.sensor, tof_s),
+            times[picked],
             np.linspace(0.0, tof_s, _CHECKS + 1)[1:-1],
         )
     )
-    return SplineFlight(case, tof_s, knot_s, thrust, np.append(share, np.zeros(len(bare))), sensor, check)
+    return SplineFlight(
+        case, tof_s, knot_s, thrust, np.append(share, np.zeros(len(bare))), sensor, stands_for, check
+    )
 
 
 def held_along(flight: SplineFlight, knots_m: FloatArray, softness: float) -> Held:
@@ -152,19 +162,37 @@ def held_along(flight: SplineFlight, knots_m: FloatArray, softness: float) -> He
     Held
     """
     case, t_s = flight.case, flight.sensor.t_s
-    nodes = np.argsort(flight.thrust.t_s)
-    along = flight.thrust.at(knots_m)[0][nodes]
-    transitions = state_transitions(case.asteroid, flight.thrust.t_s[nodes], along, t_s)
     bright = lit(case, t_s)
     bright &= sunlit_lines(case, t_s, bright)
     clear = clear_lines(case, flight.sensor.at(knots_m)[0], bright)
-    return Held(transitions, bright & clear, softness)
+    return Held(transitions_along(flight, knots_m, t_s), bright & clear, softness)
+
+
+def transitions_along(flight: SplineFlight, knots_m: FloatArray, t_s: FloatArray) -> FloatArray:
+    """Linearise the motion along a spline.
+
+    Parameters
+    ----------
+    flight : SplineFlight
+        The spline.
+    knots_m : (m, 3) float, m, body frame
+        Inner knots.
+    t_s : (T,) float, s
+        Times between which the transitions are wanted.
+
+    Returns
+    -------
+    (T - 1, 6, 6) float, SI, rotating body frame
+    """
+    nodes = np.argsort(flight.thrust.t_s)
+    along = flight.thrust.at(knots_m)[0][nodes]
+    return state_transitions(flight.case.asteroid, flight.thrust.t_s[nodes], along, t_s)
 
 
 def thrust_along(flight: SplineFlight, samples: SplineSamples, knots_m: FloatArray) -> FloatArray:
     """Thrust over mass that keeps the spacecraft on the spline (eq 1), (k, 3) float, m/s2, body frame."""
     r, v, a = samples.at(knots_m)
-    by_r, by_v = _frame_slopes(flight.case.asteroid.rotation_rate_rad_s)
+    by_v, by_r = frame_slopes(flight.case.asteroid.rotation_rate_rad_s)
     return a - accelerations(flight.case.asteroid.gravity, r) - r @ by_r.T - v @ by_v.T
 
 
@@ -197,12 +225,14 @@ def thrust_with_slopes(flight: SplineFlight, knots_m: FloatArray) -> Thrust:
     -------
     Thrust
     """
-    samples, field = flight.thrust, flight.case.asteroid.gravity
-    by_r, by_v = _frame_slopes(flight.case.asteroid.rotation_rate_rad_s)
-    by_r = by_r + gradients(field, samples.at(knots_m)[0])
-    r, v, a = samples.basis[:, :, None, :, None]  # (k, 1, m, 1) each
-    slope = a * np.eye(3)[:, None, :] - r * by_r[:, :, None, :] - v * by_v[:, None, :]
-    return Thrust(thrust_along(flight, samples, knots_m), slope.reshape(len(samples.t_s), 3, -1))
+    samples, asteroid = flight.thrust, flight.case.asteroid
+    r, v, a = samples.at(knots_m)
+    g, G = accelerations_and_gradients(asteroid.gravity, r)
+    by_v, by_r = frame_slopes(asteroid.rotation_rate_rad_s)
+    u = a - g - r @ by_r.T - v @ by_v.T
+    R, V, A = samples.basis[:, :, None, :, None]  # (k, 1, m, 1) each
+    slope = A * np.eye(3)[:, None, :] - R * (by_r + G)[:, :, None, :] - V * by_v[:, None, :]
+    return Thrust(u, slope.reshape(len(u), 3, -1))
 
 
 def energy(flight: SplineFlight, thrust: Thrust) -> tuple[float, FloatArray, FloatArray]:
@@ -247,11 +277,12 @@ def mean_sigma(flight: SplineFlight, held: Held, knots_m: FloatArray) -> tuple[f
     """
     case, position = flight.case, flight.sensor.at(knots_m)[0]
     sight = soft_sight(case, held.not_hidden, held.softness)
-    information = information_along(sight, position)
+    each = flight.stands_for[:, None, None]
+    information = each * information_along(sight, position)
     mean, by_information = mean_sigma_with_slopes(
         case.prior, flight.sensor.t_s, held.transitions, information
     )
-    by_position = information_slopes(sight, position, by_information)
+    by_position = information_slopes(sight, position, each * by_information)
     return mean, (flight.sensor.basis[0].T @ by_position).ravel()
 
 
@@ -315,11 +346,6 @@ def information_program(
 def knots_of(flight: SplineFlight, path: Path) -> FloatArray:
     """Knots of the spline through a path, (m, 3) float, m, body frame."""
     return positions_at(path, flight.knot_s)
-
-
-def _frame_slopes(w: float) -> tuple[FloatArray, FloatArray]:
-    """Centrifugal acceleration by position and Coriolis acceleration by velocity."""
-    return np.diag([w * w, w * w, 0.0]), np.array([[0.0, 2.0 * w, 0.0], [-2.0 * w, 0.0, 0.0], [0.0] * 3])
 
 
 def _glide_slope(flight: SplineFlight, origin_m: FloatArray) -> tuple[ConeBlock, ...]:

@@ -27,6 +27,7 @@ from landing_cli.observe.records import Landmarks, ObserveCase, Sensor
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
+_NOTHING = 1e-12  # a smaller weight is none
 _SEVERED_M = 1e-9  # a sight line shorter than this has no direction
 
 
@@ -192,16 +193,6 @@ def _weight(
     """
     s, weight = sight.softness, 1.0
     slope[:] = 0.0
-    if sight.range_min > 0.0:
-        share = _logistic(math.log(rho / sight.range_min) / s)
-        weight *= share
-        for a in range(3):
-            slope[a] -= (1.0 - share) / (s * rho) * u[a]
-    if sight.range_max < math.inf:
-        share = _logistic(math.log(sight.range_max / rho) / s)
-        weight *= share
-        for a in range(3):
-            slope[a] += (1.0 - share) / (s * rho) * u[a]
     if sight.cos_field_of_view > -1.0:
         width = s * math.sqrt(1.0 - sight.cos_field_of_view**2)
         cosine = boresight[0] * u[0] + boresight[1] * u[1] + boresight[2] * u[2]
@@ -212,6 +203,8 @@ def _weight(
             if away > 0.0:
                 turn -= (u[a] - cosine * boresight[a]) / away
             slope[a] += (1.0 - share) / width * turn
+    if weight < _NOTHING:
+        return 0.0
     if sight.cos_emission > -1.0:
         width = s * math.sqrt(1.0 - sight.cos_emission**2)
         n = sight.normal[j]
@@ -220,6 +213,18 @@ def _weight(
         weight *= share
         for a in range(3):
             slope[a] += (1.0 - share) / width * (n[a] + cosine * u[a]) / rho
+    if weight < _NOTHING:
+        return 0.0
+    if sight.range_min > 0.0:
+        share = _logistic(math.log(rho / sight.range_min) / s)
+        weight *= share
+        for a in range(3):
+            slope[a] -= (1.0 - share) / (s * rho) * u[a]
+    if sight.range_max < math.inf:
+        share = _logistic(math.log(sight.range_max / rho) / s)
+        weight *= share
+        for a in range(3):
+            slope[a] += (1.0 - share) / (s * rho) * u[a]
     return weight
 
 
@@ -261,6 +266,8 @@ def _inform(sight: Sight, positions: FloatArray, information: FloatArray) -> Non
             if rho < _SEVERED_M:
                 continue
             weight = _weight(sight, j, u, rho, boresight, away, slope) if sight.soft else 1.0
+            if weight == 0.0:
+                continue
             across = weight * sight.angle_information / (rho * rho)
             along = weight * sight.range_information - across
             for a in range(3):
@@ -285,6 +292,8 @@ def _slope(sight: Sight, positions: FloatArray, by_information: FloatArray, slop
             weight = 1.0
             if sight.soft:
                 weight = _weight(sight, j, u, rho, boresight, away, slope)
+            if weight == 0.0:
+                continue
             x = B[0, 0] * u[0] + B[0, 1] * u[1] + B[0, 2] * u[2]
             y = B[1, 0] * u[0] + B[1, 1] * u[1] + B[1, 2] * u[2]
             z = B[2, 0] * u[0] + B[2, 1] * u[1] + B[2, 2] * u[2]
