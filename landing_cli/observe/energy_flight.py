@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from landing_cli.flight.acceleration_control import natural_accelerations
-from landing_cli.flight.linearised_arcs import LinearisedArcs
+from landing_cli.flight.linearised_arcs import LinearisedArcs, linearised_arcs
 from landing_cli.observe.records import ObserveCase, Waypoints
 
 FloatArray = NDArray[np.float64]
@@ -226,3 +226,75 @@ def energy_matrix(flight: EnergyFlight) -> sparse.csr_array:
     by_node = sparse.diags_array([third, main, third], offsets=[-1, 0, 1])
     place = sparse.csr_array((np.ones(3), (range(6, 9), range(6, 9))), shape=(WIDTH, WIDTH))
     return sparse.csr_array(sparse.kron(by_node, place))
+
+
+def flight_arcs(flight: EnergyFlight, x: FloatArray | None) -> LinearisedArcs:
+    """Linearise the flight about a path.
+
+    Parameters
+    ----------
+    flight : EnergyFlight
+        Nodes, field and spin.
+    x : (9 (n + 1),) float or None
+        Scaled unknowns of the path; None takes the spline through the waypoints.
+
+    Returns
+    -------
+    LinearisedArcs
+    """
+    asteroid, origin = flight.case.asteroid, flight.case.frame.origin_m
+    positions = spline_positions(flight)
+    if x is not None:
+        states = x.reshape(-1, WIDTH)[:, :6] * flight.unit[:6]
+        positions = hermite_positions(flight.times_s, states[:, R] + origin, states[:, V])
+    return linearised_arcs(
+        asteroid.gravity, asteroid.rotation_rate_rad_s, flight.times_s, positions, flight.edges_s, origin
+    )
+
+
+def nearest_flight(flight: EnergyFlight, x: FloatArray | None) -> FloatArray:
+    """Solve the linearised flight whose thrust is closest to a path's, or least where there is none.
+
+    Parameters
+    ----------
+    flight : EnergyFlight
+        What is transcribed.
+    x : (9 (n + 1),) float or None
+        Scaled unknowns of the path.
+
+    Returns
+    -------
+    (9 (n + 1),) float
+        Scaled unknowns that begin, pass and end as asked.
+    """
+    target = np.zeros(WIDTH * len(flight.times_s)) if x is None else x
+    motion = dynamics_rows(flight, flight_arcs(flight, x))
+    return closest(energy_matrix(flight), target, motion, boundary_rows(flight))
+
+
+def closest(
+    P: sparse.csr_array,
+    target: FloatArray,
+    *rows: tuple[sparse.csr_array, FloatArray],
+) -> FloatArray:
+    """Minimise (x - target)' P (x - target) / 2 where ``matrix x + offset = 0``, by the KKT system.
+
+    Parameters
+    ----------
+    P : (w, w) sparse
+        Positive semidefinite, and definite where the equations leave x free.
+    target : (w,) float
+        What to come close to; zero for the least x'P x.
+    *rows : (sparse, float)
+        Matrices and offsets of the equations.
+
+    Returns
+    -------
+    (w,) float
+    """
+    from scipy.sparse.linalg import splu
+
+    matrix = sparse.vstack([part[0] for part in rows])
+    right = np.concatenate([P @ target, *(-part[1] for part in rows)])
+    system = sparse.block_array([[P, matrix.T], [matrix, None]], format="csc")
+    return np.asarray(splu(system).solve(right)[: P.shape[0]])

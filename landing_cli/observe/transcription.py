@@ -14,18 +14,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
-from landing_cli.flight.linearised_arcs import linearised_arcs
 from landing_cli.observe.energy_flight import (
     WIDTH,
     EnergyFlight,
+    R,
     U,
+    V,
     boundary_rows,
+    closest,
     dynamics_rows,
     energy_flight,
     energy_matrix,
-    hermite_positions,
+    flight_arcs,
     spline_positions,
 )
 from landing_cli.observe.path_values import path_of
@@ -76,10 +77,13 @@ def least_energy_path(case: ObserveCase, tof_s: float, waypoints: Waypoints | No
     Returns
     -------
     Path
-        ``unresolved`` where the rounds do not settle.
+        ``unresolved`` where the rounds do not settle; ``infeasible`` where no path within thrust, terrain and
+        glide slope was found.
     """
     flight = energy_flight(case, tof_s, waypoints, nodes)
-    return solved_path(flight, solve_energy(flight))
+    free = solve_energy(flight)
+    path = measured_path(flight, free.x, *_told(flight, free))
+    return path if path.status != "infeasible" else _bounded_path(flight, free, path.message)
 
 
 def solve_energy(flight: EnergyFlight) -> EnergySolution:
@@ -94,70 +98,53 @@ def solve_energy(flight: EnergyFlight) -> EnergySolution:
     -------
     EnergySolution
     """
-    asteroid, origin, unit = flight.case.asteroid, flight.case.frame.origin_m, flight.unit
-    boundary, P = boundary_rows(flight), energy_matrix(flight)
-    positions = spline_positions(flight)
-    before, step, rounds = positions(flight.times_s), np.inf, 0
-    while rounds < MOST_ROUNDS:
-        arcs = linearised_arcs(
-            asteroid.gravity,
-            asteroid.rotation_rate_rad_s,
-            flight.times_s,
-            positions,
-            flight.edges_s,
-            origin,
-        )
-        x = _least_energy(P, dynamics_rows(flight, arcs), boundary)
-        nodes = x.reshape(-1, WIDTH)[:, :6] * unit[:6]
-        after = nodes[:, :3] + origin
+    P, boundary = energy_matrix(flight), boundary_rows(flight)
+    still, path, rounds = np.zeros(P.shape[0]), None, 0
+    before = spline_positions(flight)(flight.times_s) - flight.case.frame.origin_m
+    while True:
+        x = closest(P, still, dynamics_rows(flight, flight_arcs(flight, path)), boundary)
+        after = x.reshape(-1, WIDTH)[:, R] * flight.length_m
         step, rounds = float(np.abs(after - before).max()) / flight.length_m, rounds + 1
-        if step <= STEP_TOLERANCE or not np.isfinite(step):
-            break
-        positions, before = hermite_positions(flight.times_s, after, nodes[:, 3:]), after
-    return EnergySolution(x, step <= STEP_TOLERANCE, step, rounds)
+        if step <= STEP_TOLERANCE or not np.isfinite(step) or rounds == MOST_ROUNDS:
+            return EnergySolution(x, step <= STEP_TOLERANCE, step, rounds)
+        path, before = x, after
 
 
-def solved_path(flight: EnergyFlight, solution: EnergySolution) -> Path:
-    """Unscale a solution and measure it.
+def measured_path(flight: EnergyFlight, x: FloatArray, status: PathStatus, message: str, rounds: int) -> Path:
+    """Unscale the unknowns and measure the path.
 
     Parameters
     ----------
     flight : EnergyFlight
         What was transcribed.
-    solution : EnergySolution
-        Its solution.
+    x : (9 (n + 1),) float
+        Scaled unknowns.
+    status, message, rounds
+        What the solver says.
 
     Returns
     -------
     Path
     """
-    nodes = solution.x.reshape(-1, WIDTH) * flight.unit
-    status: PathStatus = "planned" if solution.converged else "unresolved"
-    message = f"settled in {solution.rounds} rounds"
-    if not solution.converged:
-        message = f"not settled after {solution.rounds} rounds: nodes still move by "
-        message += f"{solution.step * flight.length_m:.3g} m"
-    return path_of(
-        flight.case,
-        flight.times_s,
-        nodes[:, :3] + flight.case.frame.origin_m,
-        nodes[:, 3:6],
-        nodes[:, U],
-        status,
-        message,
-        solution.rounds,
-    )
+    nodes = x.reshape(-1, WIDTH) * flight.unit
+    position = nodes[:, R] + flight.case.frame.origin_m
+    return path_of(flight.case, flight.times_s, position, nodes[:, V], nodes[:, U], status, message, rounds)
 
 
-def _least_energy(
-    P: sparse.csr_array,
-    dynamics: tuple[sparse.csr_array, FloatArray],
-    boundary: tuple[sparse.csr_array, FloatArray],
-) -> FloatArray:
-    """Minimise x'P x / 2 under linear equations by their KKT system."""
-    from scipy.sparse.linalg import splu
+def _told(flight: EnergyFlight, solution: EnergySolution) -> tuple[PathStatus, str, int]:
+    rounds = solution.rounds
+    if solution.converged:
+        return "planned", f"settled in {rounds} rounds", rounds
+    left = solution.step * flight.length_m
+    return "unresolved", f"not settled after {rounds} rounds: nodes still move by {left:.3g} m", rounds
 
-    rows = sparse.vstack([dynamics[0], boundary[0]])
-    right = -np.concatenate([np.zeros(P.shape[0]), dynamics[1], boundary[1]])
-    system = sparse.block_array([[P, rows.T], [rows, None]], format="csc")
-    return np.asarray(splu(system).solve(right)[: P.shape[0]])
+
+def _bounded_path(flight: EnergyFlight, free: EnergySolution, why: str) -> Path:
+    """Solve again with the limits that the free optimum breaks."""
+    from landing_cli.observe.bounded_transcription import solve_bounded
+
+    x, solution, rounds = solve_bounded(flight, free.x)
+    statuses: dict[str, PathStatus] = {"converged": "planned", "infeasible": "infeasible"}
+    status = statuses.get(solution.status, "unresolved")
+    message = f"without limits {why}; within them: {solution.message}"
+    return measured_path(flight, x, status, message, free.rounds + rounds)
