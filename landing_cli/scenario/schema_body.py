@@ -137,6 +137,8 @@ class Body(Section):
             _check_epoch(self.epoch_utc)
         if self.sun_direction is not None and not any(self.sun_direction):
             raise wrong("sun_direction", "is zero", "give the direction from the body to the sun")
+        if self.sun_direction is not None and max(map(abs, self.sun_direction)) > 1e15:
+            raise wrong("sun_direction", "is longer than any way to the sun", "give a unit vector, or metres")
         if self.orbit is None:
             return
         if self.sun_direction is not None:

@@ -95,7 +95,8 @@ def test_the_ways_to_steer_are_those_that_are_asked_for(folder: Path) -> None:
         ("body.sun_direction=[0, 0, 0]", "body.sun_direction: is zero"),
         (
             "body.orbit={semi_major_axis_au: 1.4, eccentricity: 0.2, inclination_deg: 10,"
-            " ascending_node_deg: 1, perihelion_argument_deg: 2, mean_anomaly_deg: 3, epoch_utc: 2030-01-01T00:00:00}",
+            " ascending_node_deg: 1, perihelion_argument_deg: 2, mean_anomaly_deg: 3, "
+            "epoch_utc: 2030-01-01T00:00:00}",
             "body.pole: is missing; orbit needs it",
         ),
     ],
