@@ -1,12 +1,17 @@
-"""``python -m bench [facets | clearance | plans]``: our kernels beside what a user would use instead."""
+"""``python -m bench [facets | clearance | rays | plans]``: ours beside what a user would use instead."""
 
 from __future__ import annotations
 
 import sys
 
-from bench import clearance_bench, facet_solve, plan_bench
+from bench import clearance_bench, facet_solve, plan_bench, ray_bench
 
-BENCHES = {"facets": facet_solve.main, "clearance": clearance_bench.main, "plans": plan_bench.main}
+BENCHES = {
+    "facets": facet_solve.main,
+    "clearance": clearance_bench.main,
+    "rays": ray_bench.main,
+    "plans": plan_bench.main,
+}
 
 first = sys.argv[1] if len(sys.argv) > 1 else ""
 if first in BENCHES:
