@@ -162,8 +162,8 @@ def test_gaps_and_counts_along_a_path():
 def test_visibility_is_that_of_embree(eros):
     """200 rays from Eros landmarks, of which terrain stops dozens.
 
-    Flatter than 85 deg, embree's single precision stops rays at the landmark's own facet, 5 cm off or not: one
-    in 1500 in ``python -m bench rays``, where every facet is asked who is right, and ours always are.
+    Flatter than 85 deg, embree's single precision stops rays at the landmark's own facet, 5 cm off or not:
+    one in 1500 in ``python -m bench rays``, where every facet is asked who is right, and ours always are.
     """
     import trimesh
 
