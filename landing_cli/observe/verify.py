@@ -52,13 +52,10 @@ LIMITS: Mapping[str, float] = {
 # Paths planned in a field that was fitted to the one they are flown in.
 FITTED_LIMITS: Mapping[str, float] = {
     **LIMITS,
-    "touchdown_miss_m": 0.05,
-    "touchdown_speed_m_s": 1e-3,
-    "waypoint_miss_m": 0.05,
-    "stored_path_m": 0.05,
-    "stored_clearance_m": 0.05,
-    "stored_visible": 0.01,
-    "stored_position_sigma": 0.02,
+    "touchdown_miss_m": 1e-3,
+    "touchdown_speed_m_s": 1e-5,
+    "waypoint_miss_m": 1e-3,
+    "stored_path_m": 1e-3,
 }
 
 
