@@ -131,16 +131,16 @@ def print_run(run: ObserveRun, path: Path, as_json: bool) -> None:
     path : Path
         Its file.
     as_json : bool
-        Print JSON: the fields of a single observation stand at the top; ``observations`` lists them all.
+        Print JSON: at the top stand the fields of the last observation of the objective that was asked for;
+        ``observations`` lists them all.
     """
     from landing_cli.observe.summary import summarise
 
     found = [summarise(entry) for entry in run.cases]
     if as_json:
-        top: dict[str, Any] = {"run": str(path), "scenario": run.asteroid.name}
-        if len(found) == 1:
-            top |= found[0]
-        console.print_json({**top, "nominal": found[0]["nominal"], "observations": found})
+        asked = [one for one in found if one["objective"] == found[0]["objective"]]
+        top = {"run": str(path), "scenario": run.asteroid.name, **asked[-1]}
+        console.print_json({**top, "observations": found})
         return
     nominal = found[0]["nominal"]
     least = min(one["performance_index_m2_s3"] for one in found)

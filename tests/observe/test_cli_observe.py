@@ -87,12 +87,15 @@ def test_json_has_the_fields_of_the_contract(capsys: pytest.CaptureFixture[str])
     assert found["propellant_mass_fraction"] == pytest.approx(burnt, rel=1e-12)
     assert found["fuel_kg"] == pytest.approx(500 * burnt, rel=1e-12)
     several = as_json(capsys, "pebble", "-o", "two.h5")
-    assert "waypoints" not in several and len(several["observations"]) == 2
+    assert [one["waypoints"] for one in several["observations"]] == [0, 3]
+    assert several["waypoints"] == 3  # the last one
     assert several["nominal"] == found["nominal"]
 
 
 def test_information_stands_beside_the_waypoints(capsys: pytest.CaptureFixture[str]) -> None:
-    found = as_json(capsys, "pebble", "--objective", "information")["observations"]
+    told_ = as_json(capsys, "pebble", "--objective", "information")
+    found = told_["observations"]
+    assert told_["name"] == "information_0.1"
     assert [one["name"] for one in found] == ["information_0.1", "waypoints_0", "waypoints_3"]
     informed, least = found[0], found[1]
     assert informed["objective"] == "information" and informed["status"] == "planned"
