@@ -59,7 +59,8 @@ class Bounds:
     thrust : (n + 1,) float
         Largest thrust acceleration at the nodes, scaled.
     far : (n + 1,) bool
-        The nodes beyond the ball about the site: they keep the clearance, the others stay out of the ground.
+        The nodes beyond the ball about the site and their neighbours: they keep the clearance, the others
+        stay out of the ground.
     """
 
     thrust: FloatArray
@@ -117,7 +118,10 @@ def known_bounds(flight: EnergyFlight, x: FloatArray) -> Bounds:
     craft, nodes = flight.case.spacecraft, x.reshape(-1, WIDTH) * flight.unit
     spent = velocity_increments(flight.times_s, nodes[:, U])
     mass = craft.mass_kg * np.exp(-spent / craft.exhaust_velocity_m_s)
-    far = np.linalg.norm(nodes[:, R], axis=1) > flight.case.clearance_free_m
+    outside = np.linalg.norm(nodes[:, R], axis=1) > flight.case.clearance_free_m
+    far = outside.copy()  # and the first nodes inside: the path leaves the ball between nodes
+    far[1:] |= outside[:-1]
+    far[:-1] |= outside[1:]
     return Bounds(craft.thrust_max_n / mass / flight.unit[U][0], far)
 
 

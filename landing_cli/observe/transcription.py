@@ -146,5 +146,6 @@ def _bounded_path(flight: EnergyFlight, free: EnergySolution, why: str) -> Path:
     x, solution, rounds = solve_bounded(flight, free.x)
     statuses: dict[str, PathStatus] = {"converged": "planned", "infeasible": "infeasible"}
     status = statuses.get(solution.status, "unresolved")
-    message = f"without limits {why}; within them: {solution.message}"
+    found = {"converged": solution.message, "infeasible": f"no path was found ({solution.message})"}
+    message = f"without limits {why}; within them {found.get(solution.status, solution.message)}"
     return measured_path(flight, x, status, message, free.rounds + rounds)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.field_values import accelerations, gradients, potentials
-from landing_cli.body.gravity.interpolated_kernels import DEGREE
+from landing_cli.body.gravity.interpolated_kernels import DEGREE, PER_PIECE
 from landing_cli.body.gravity.kernel_types import FloatArray
 from landing_cli.body.gravity.triangle_boxes import triangles_in_box
 
@@ -110,7 +110,8 @@ def fit_pieces(
     -------
     Pieces
     """
-    tree, fits, centers, halves = [_UNFITTED], [], [], []
+    tree = [_UNFITTED]
+    found: list[tuple[FloatArray, FloatArray, FloatArray]] = []
     waiting = [(0, center, half, triangles, 0)]
     while waiting:
         node, at, size, near, depth = waiting.pop()
@@ -120,10 +121,8 @@ def fit_pieces(
                 continue
             fit = _fit(body, at, size)
             if _error(body, fit, at, size) <= tolerance:
-                tree[node] = -(1 + len(fits))
-                fits.append(fit)
-                centers.append(at)
-                halves.append(size)
+                tree[node] = -(1 + len(found))
+                found.append((fit, at, size))
                 continue
         if depth == most_halvings:
             continue
@@ -134,10 +133,10 @@ def fit_pieces(
         child[axis], step[axis] = 0.5 * size[axis], 0.5 * size[axis]
         waiting.append((tree[node], at - step, child, near, depth + 1))
         waiting.append((tree[node] + 1, at + step, child, near, depth + 1))
-    count = len(powers(DEGREE))
+    fits, centers, halves = zip(*found, strict=True) if found else ([], [], [])
     return Pieces(
         np.array(tree, dtype=np.int64),
-        np.array(fits).reshape(-1, count),
+        np.array(fits).reshape(-1, PER_PIECE),
         np.array(centers).reshape(-1, 3),
         np.array(halves).reshape(-1, 3),
     )
@@ -149,6 +148,23 @@ def powers(degree: int) -> IntArray:
     falling = range(degree, -1, -1)
     every = [(i, j, k) for i in falling for j in falling for k in falling if i + j + k <= degree]
     return np.array(every, dtype=np.int64)
+
+
+def probe_points(count: int, first: float) -> FloatArray:
+    """Points over the cube from -1 to 1, half of them on its faces, where fits err most.
+
+    Parameters
+    ----------
+    count : int
+        How many.
+    first : float
+        Different numbers give different points.
+
+    Returns
+    -------
+    (count, 3) float
+    """
+    return np.clip(1.3 * spread_points(count, first), -1.0, 1.0)
 
 
 def spread_points(count: int, first: float) -> FloatArray:
@@ -200,13 +216,13 @@ def _scheme() -> tuple[FloatArray, FloatArray, FloatArray, int]:
     solve[constant] = 0.0  # the gradient does not know it
     turned = np.array([np.append(p, np.zeros(DEGREE - i)) for i, p in enumerate(_chebyshev_in_powers())]).T
     to_powers = np.prod([turned[order[:, a][:, None], order[:, a][None]] for a in range(3)], axis=0)
-    return points, solve, np.asarray(to_powers), constant
+    return points, np.asarray(solve, dtype=np.float64), np.asarray(to_powers), constant
 
 
 @lru_cache(maxsize=1)
 def _check_scheme() -> tuple[FloatArray, FloatArray]:
     """Points of the check, and what takes coefficients to the gradient there, (3, k, c)."""
-    points = np.clip(1.02 * spread_points(_CHECK_POINTS, 0.25), -1.0, 1.0)
+    points = probe_points(_CHECK_POINTS, 0.25)
     return points, _slope_matrix(points)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from landing_cli.body.gravity.checks import checked_number
 from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.field_values import accelerations_and_gradients
-from landing_cli.body.gravity.fitted_pieces import Pieces, TurnedPolyhedron, fit_pieces, spread_points
+from landing_cli.body.gravity.fitted_pieces import Pieces, TurnedPolyhedron, fit_pieces, probe_points
 from landing_cli.body.gravity.interpolated_kernels import HEADER
 from landing_cli.body.gravity.kernel_types import FloatArray
 from landing_cli.body.gravity.polyhedron_records import recorded_corners
@@ -131,7 +131,7 @@ def _measured(field: GravityField, body: TurnedPolyhedron, pieces: Pieces) -> tu
     """Largest relative errors of g and its gradient over all pieces, at points that the fit did not see."""
     if not len(pieces.center):
         return 0.0, 0.0, 0
-    local = np.clip(1.05 * spread_points(_PROBE_POINTS, 0.75), -1.0, 1.0)
+    local = probe_points(_PROBE_POINTS, 0.75)
     points = body.to_body((pieces.center[:, None] + pieces.half[:, None] * local).reshape(-1, 3))
     g, G = accelerations_and_gradients(field, points)
     exact_g, exact_G = accelerations_and_gradients(body.field, points)
