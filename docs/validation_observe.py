@@ -178,7 +178,7 @@ def _gravity() -> str:
     for gravity in ("polyhedron", "interpolated"):
         ground = ground_of(request_of(load(str(SCENARIO), [f"observe.gravity={gravity}"])))
         entry, cpu_s = _solved(ground, replace(ground.ways[0], waypoints=3))
-        report = verify_path(ground.case, entry.name, entry.observation.steered, fitted=True)
+        report = verify_path(ground.case, entry.name, entry.observation.steered)
         error = ground.gravity.get("gravity_error_relative")
         rows.append(
             (

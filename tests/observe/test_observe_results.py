@@ -219,7 +219,7 @@ def with_less_doubt(c: Any, o: Any, w: Any) -> Any:
 
 
 def with_other_waypoints(c: Any, o: Any, w: Any) -> Any:
-    return c, o, replace(w, position_m=moved(w.position_m, 1e-3))
+    return c, o, replace(w, position_m=moved(w.position_m, 1e-2))
 
 
 LIES: list[tuple[Any, str]] = [
@@ -228,9 +228,9 @@ LIES: list[tuple[Any, str]] = [
     (of_path("propellant_mass_fraction", lambda x: 1.1 * x), "stored_propellant_mass_fraction"),
     (of_path("peak_thrust_n", lambda x: 0.9 * x), "stored_peak_thrust"),
     (of_path("clearance_min_m", lambda x: x + 0.1), "stored_clearance_m"),
-    (of_path("position_m", lambda x: moved(x, 1e-3)), "stored_path_m"),
-    (of_path("acceleration_m_s2", lambda x: moved(x, 1e-6)), "touchdown_miss_m"),
-    (of_path("acceleration_m_s2", lambda x: moved(x, 1e-6)), "touchdown_speed_m_s"),
+    (of_path("position_m", lambda x: moved(x, 1e-2)), "stored_path_m"),
+    (of_path("acceleration_m_s2", lambda x: moved(x, 1e-5)), "touchdown_miss_m"),
+    (of_path("acceleration_m_s2", lambda x: moved(x, 1e-5)), "touchdown_speed_m_s"),
     (with_other_waypoints, "waypoint_miss_m"),
     (of_case(clearance_m=80.0), "clearance_shortfall_m"),
     (of_case(glide_slope_half_angle_rad=0.2), "glide_slope_excess_rad"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -100,8 +100,9 @@ def _draw_front(axes: Axes, entries: Sequence[ObservationEntry], quantity: str) 
             ]
         )
         order = np.argsort(points[:, 0])
-        line = "-" if group is informed else "none"
-        axes.plot(*points[order].T, color=colour, marker=marker, ls=line, lw=1.0, markersize=6, label=name)
+        # between two points of the front nothing is known but that the dearer one is no better
+        look: dict[str, Any] = {"ls": "-", "drawstyle": "steps-post"} if group is informed else {"ls": "none"}
+        axes.plot(*points[order].T, color=colour, marker=marker, lw=1.0, markersize=6, label=name, **look)
         for entry, point in zip(group, points, strict=True):
             told = (
                 f"{entry.observation.parameters['weight']:g}" if group is informed else f"{_waypoints(entry)}"
