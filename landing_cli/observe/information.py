@@ -36,7 +36,7 @@ from landing_cli.optimize.curved_program import CurvedSolution, solve_curved_pro
 
 FloatArray = NDArray[np.float64]
 
-SOFTNESS = (0.3, 0.1, 0.03)
+SOFTNESS = (0.3, 0.1, 0.03, 0.01, 0.003)
 """Widths of the sensor's limits, one after the other: radians about an angle, share of a range."""
 
 _CONTINUATION = (0.1, 0.3)  # shares of the weight
@@ -69,6 +69,11 @@ class Candidate:
         if self.solution.violation > _FINE.violation_tol:
             return math.inf
         return self.energy_m2_s3 / energy_unit + weight * math.log(self.sigma_m)
+
+    def rank(self, weight: float, energy_unit: float) -> tuple[bool, float, float]:
+        """Least is best: what has converged, then the cost, then the violation."""
+        cost = self.cost(weight, energy_unit)
+        return self.solution.status != "converged", cost, self.solution.violation
 
 
 def most_informative_path(
@@ -138,9 +143,7 @@ def best_spline(
         solved = [_solved(flight, held_along(flight, k, softness), k, unit, weight, drive) for k in pool]
         found += solved
         pool = _distinct([one.knots_m for one in solved], _SAME * flight.length_m)
-    best = min(
-        found, key=lambda one: (one.cost(weight, unit.performance_index_m2_s3), one.solution.violation)
-    )
+    best = min(found, key=lambda one: one.rank(weight, unit.performance_index_m2_s3))
     return best, sum(one.solution.rounds for one in found)
 
 

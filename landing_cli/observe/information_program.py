@@ -41,8 +41,9 @@ GLIDE_SLOPE_MARGIN_RAD = 2e-5
 
 _MOST_TIMES = 250  # of the sensor's that the program looks at; each stands for its neighbours
 _SPANS = 16  # at least so many pieces of four Gauss points in the integral of u'u
-_CHECKS = 200  # even samples held against terrain and glide slope
-_BUCKET = 5  # of which share a row
+_CHECKS = 600  # even samples held against the terrain
+_BUCKET = 15  # of which share a row
+_CONE_CHECKS = 4  # every so many of them are held against the glide slope
 
 
 @dataclass(frozen=True, eq=False)
@@ -349,14 +350,15 @@ def knots_of(flight: SplineFlight, path: Path) -> FloatArray:
 
 
 def _glide_slope(flight: SplineFlight, origin_m: FloatArray) -> tuple[ConeBlock, ...]:
-    """The cone about the site frame's z at every check: z . d >= cos(angle) |d|."""
+    """The cone about the site frame's z at even times: z . d >= cos(angle) |d|."""
     case = flight.case
     if case.glide_slope_half_angle_rad is None:
         return ()
     angle = case.glide_slope_half_angle_rad - GLIDE_SLOPE_MARGIN_RAD
     lift = np.concatenate([case.frame.axes[2][None], math.cos(angle) * np.eye(3)])
-    offset = (flight.check.at(origin_m)[0] - case.frame.origin_m) @ lift.T / flight.length_m
-    matrix = sparse.kron(sparse.csr_array(flight.check.basis[0]), lift, format="csr")
+    rows = slice(None, None, _CONE_CHECKS)
+    offset = (flight.check.at(origin_m)[0][rows] - case.frame.origin_m) @ lift.T / flight.length_m
+    matrix = sparse.kron(sparse.csr_array(flight.check.basis[0][rows]), lift, format="csr")
     return (ConeBlock("second_order", matrix, offset.ravel(), 4),)
 
 
@@ -367,8 +369,10 @@ def _limits(flight: SplineFlight, knots_m: FloatArray, thrust: Thrust) -> Smooth
     u, by_knots = thrust.u_m_s2, thrust.by_knots
     L, n = flight.length_m, by_knots.shape[2]
     room, slope, fall = _terrain(flight, knots_m)
-    value = np.concatenate([1.0 - (u * u).sum(axis=1) / bound**2, room / L])
-    rows = np.concatenate([-2.0 * L / bound**2 * np.einsum("ka,kan->kn", u, by_knots), slope])
+    size = np.linalg.norm(u, axis=1)
+    along = u / np.maximum(size, 1e-12 * bound)[:, None]
+    value = np.concatenate([1.0 - size / bound, room / L])
+    rows = np.concatenate([-L / bound * np.einsum("ka,kan->kn", along, by_knots), slope])
     far = np.concatenate([np.full(len(u), np.inf), fall])
     return SmoothRows(np.zeros(0), sparse.csr_array((0, n)), value, sparse.csr_array(rows), far)
 
@@ -382,7 +386,9 @@ def _terrain(flight: SplineFlight, knots_m: FloatArray) -> tuple[FloatArray, Flo
     if case.clearance_m is not None:
         offset = position - case.frame.origin_m
         away = np.linalg.norm(offset, axis=1)
-        inside = case.clearance_free_m - away  # near the site the terrain alone counts
+        # near the site the terrain alone counts; a step less, so that no sample is skipped on the way out
+        step = min(1.5 * flight.length_m / _CHECKS, 0.25 * case.clearance_free_m)
+        inside = case.clearance_free_m - step - away
         near = inside < room
         forgiven = np.where(near, inside, room)
         asked = room - case.clearance_m - CLEARANCE_MARGIN_M - 0.5 * TOUCHDOWN_TOLERANCE_M

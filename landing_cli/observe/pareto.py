@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,7 +23,44 @@ FloatArray = NDArray[np.float64]
 WEIGHTS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 """The front is laid out with these weights, then refined about each energy that is asked for."""
 
-_BISECTIONS = 4  # of the weight between two points of the front: a quarter of a decade to a thirtieth
+_REFINEMENTS = 2
+_AIM = 0.98  # of the energy beyond the least that is asked for, so that the answer lies within
+
+
+@dataclass(frozen=True, eq=False)
+class Front:
+    """Splines that trade control energy for navigation.
+
+    Attributes
+    ----------
+    flight : SplineFlight
+    least : Path
+        The least-energy path.
+    points : dict
+        By weight; more are added where the front is refined.
+    """
+
+    flight: SplineFlight
+    least: Path
+    points: dict[float, Candidate]
+
+    def within(self, energy_m2_s3: float) -> tuple[Path, float]:
+        """Fly the point of least sigma within an energy, m2/s3; the least path and weight 0 if none is."""
+        usable = [
+            (point.sigma_m, weight)
+            for weight, point in self.points.items()
+            if point.energy_m2_s3 <= energy_m2_s3 and point.solution.status == "converged"
+        ]
+        if not usable:
+            return self.least, 0.0
+        weight = min(usable)[1]
+        point = self.points[weight]
+        return flown(self.flight, point, self.least, point.solution.rounds), weight
+
+    def energy_for(self, sigma_m: float) -> float:
+        """Least J, m2/s3, of the points whose mean position sigma is no larger, m; infinite if none is."""
+        usable = [point.energy_m2_s3 for point in self.points.values() if point.sigma_m <= sigma_m]
+        return min(usable, default=math.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +76,15 @@ class EqualEnergy:
         Of the front at no more than the paper's J; the least-energy path where no point of the front is.
     weight : float
         lambda of that point; 0 where there is none.
+    energy_for_sigma_m2_s3 : float, m2/s3
+        Least J of the front's points that know the position no worse than the paper's path; infinite if none.
     """
 
     waypoints: int
     paper: ObservedPath
     informed: ObservedPath
     weight: float
+    energy_for_sigma_m2_s3: float
 
     @property
     def sigma_ratio(self) -> float:
@@ -82,23 +123,24 @@ def compare_at_equal_energy(
         way = SteeringOptions(waypoints=count, timing=options.timing, nodes=options.nodes)
         waypoints = waypoints_of(case, control, nominal.tof_s, way)
         papers.append(least_energy_path(case, nominal.tof_s, waypoints, options.nodes))
-    energies = [path.performance_index_m2_s3 for path in papers]
-    found = informed_within(case, least, energies, knots, papers)
-    compared = [
-        EqualEnergy(count, observed(case, paper), observed(case, path), weight)
-        for count, paper, (path, weight) in zip(counts, papers, found, strict=True)
-    ]
+    front = front_about(case, least, [path.performance_index_m2_s3 for path in papers], knots, papers)
+    compared = []
+    for count, path in zip(counts, papers, strict=True):
+        paper = observed(case, path)
+        informed, weight = front.within(path.performance_index_m2_s3)
+        for_sigma = front.energy_for(paper.sigma.mean_m)
+        compared.append(EqualEnergy(count, paper, observed(case, informed), weight, for_sigma))
     return observed(case, least), compared
 
 
-def informed_within(
+def front_about(
     case: ObserveCase,
     least: Path,
     energies_m2_s3: Sequence[float],
     knots: int,
     others: Sequence[Path] = (),
-) -> list[tuple[Path, float]]:
-    """Find the most informative path within each of several energies.
+) -> Front:
+    """Lay out the front of control energy against navigation, finely about several energies.
 
     Parameters
     ----------
@@ -107,7 +149,7 @@ def informed_within(
     least : Path
         The least-energy path.
     energies_m2_s3 : sequence of float, m2/s3
-        Bounds of J.
+        Where the front is wanted.
     knots : int
         Inner spline knots.
     others : sequence of Path, optional
@@ -115,50 +157,41 @@ def informed_within(
 
     Returns
     -------
-    list of (Path, float)
-        The path within each energy and its weight; the least-energy path and 0 where none is found.
+    Front
+        Its weights end with the first that spends more than every energy.
     """
     flight = spline_flight(case, least.tof_s, knots)
     starts = [knots_of(flight, path) for path in (least, *others)]
-    front: dict[float, Candidate] = {}
+    front = Front(flight, least, {})
     for weight in WEIGHTS:
-        front[weight] = _with_weight(flight, starts, least, weight, front)
-        if front[weight].energy_m2_s3 > max(energies_m2_s3):
+        _add_point(front, starts, weight)
+        if front.points[weight].energy_m2_s3 > max(energies_m2_s3):
             break
-    answers = []
-    for bound in energies_m2_s3:
-        for _ in range(_BISECTIONS):
-            within = [w for w in sorted(front) if front[w].energy_m2_s3 <= bound]
-            beyond = [w for w in sorted(front) if front[w].energy_m2_s3 > bound]
-            if not within or not beyond or max(within) > min(beyond):
+    for energy in energies_m2_s3:
+        for _ in range(_REFINEMENTS):
+            between = _weight_between(front, energy)
+            if between is None:
                 break
-            middle = float(np.sqrt(max(within) * min(beyond)))
-            front[middle] = _with_weight(flight, starts, least, middle, front)
-        answers.append(_best_within(flight, front, bound, least))
-    return answers
+            _add_point(front, starts, between)
+    return front
 
 
-def _with_weight(
-    flight: SplineFlight,
-    starts: Sequence[FloatArray],
-    least: Path,
-    weight: float,
-    front: dict[float, Candidate],
-) -> Candidate:
-    """One point of the front, searched from its lighter neighbour too."""
-    lighter = [front[w].knots_m for w in sorted(front) if w < weight][-1:]
-    return best_spline(flight, [*starts, *lighter], least, weight)[0]
+def _add_point(front: Front, starts: Sequence[FloatArray], weight: float) -> None:
+    """Add one point, searched from its lighter neighbour too."""
+    lighter = [front.points[w].knots_m for w in sorted(front.points) if w < weight][-1:]
+    front.points[weight] = best_spline(front.flight, [*starts, *lighter], front.least, weight)[0]
 
 
-def _best_within(
-    flight: SplineFlight, front: dict[float, Candidate], bound: float, least: Path
-) -> tuple[Path, float]:
-    usable = [
-        (one.sigma_m, weight)
-        for weight, one in front.items()
-        if one.energy_m2_s3 <= bound and one.solution.status == "converged"
-    ]
-    if not usable:
-        return least, 0.0
-    weight = min(usable)[1]
-    return flown(flight, front[weight], least, front[weight].solution.rounds), weight
+def _weight_between(front: Front, energy: float) -> float | None:
+    """Weight at which the front should come to an energy, by its neighbours; None where one is missing."""
+    weights, unit = sorted(front.points), front.least.performance_index_m2_s3
+    excess = {w: max(front.points[w].energy_m2_s3 / unit - 1.0, 1e-9) for w in weights}
+    wanted = _AIM * (energy / unit - 1.0)
+    within = [w for w in weights if excess[w] <= wanted]
+    beyond = [w for w in weights if excess[w] > wanted]
+    if not within or not beyond or max(within) >= min(beyond):
+        return None
+    low, high = max(within), min(beyond)
+    share = math.log(wanted / excess[low]) / math.log(excess[high] / excess[low])
+    share = min(max(share, 0.1), 0.9)
+    return float(low * (high / low) ** share)

@@ -153,7 +153,10 @@ def solve_curved_program(
             continue
         there, candidate = program.objective(step.x), program.smooth(step.x)
         achieved = here.value + price * rows.total - there.value - price * candidate.total
-        learnt = _with_update(learnt, step.x - x, there.slope - here.slope - here.curvature @ (step.x - x))
+        # of the Lagrangian, so that the rows' curvature is learnt too
+        priced = (candidate.inequality_slope - rows.inequality_slope).T @ step.inequality_multipliers
+        bend = there.slope - here.slope - priced - here.curvature @ (step.x - x)
+        learnt = _with_update(learnt, step.x - x, bend)
         if achieved < 0.25 * expected:
             trust = 0.5 * min(trust, step.length)
         elif achieved > 0.7 * expected:
