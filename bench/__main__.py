@@ -1,16 +1,17 @@
-"""``python -m bench [facets | clearance | rays | plans]``: ours beside what a user would use instead."""
+"""``python -m bench [facets | clearance | rays | plans | observe]``: ours beside the usual."""
 
 from __future__ import annotations
 
 import sys
 
-from bench import clearance_bench, facet_solve, plan_bench, ray_bench
+from bench import clearance_bench, facet_solve, observe_bench, plan_bench, ray_bench
 
 BENCHES = {
     "facets": facet_solve.main,
     "clearance": clearance_bench.main,
     "rays": ray_bench.main,
     "plans": plan_bench.main,
+    "observe": observe_bench.main,
 }
 
 first = sys.argv[1] if len(sys.argv) > 1 else ""

@@ -21,7 +21,7 @@ from landing_cli.body.gravity.kernel_types import FloatArray
 from landing_cli.body.gravity.polyhedron_records import recorded_corners
 from landing_cli.errors import InputRefused
 
-TOLERANCE = 1e-9
+TOLERANCE = 1e-8
 MOST_HALVINGS = 9
 _PROBE_POINTS = 40
 
