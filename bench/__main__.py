@@ -1,15 +1,26 @@
-"""``python -m bench [facets | clearance | plans | tour-search]``: our kernels beside what else there is."""
+"""``python -m bench [facets | clearance | rays | plans | observe | tour | tour-search]``: ours and the usual."""
 
 from __future__ import annotations
 
 import sys
 
-from bench import clearance_bench, facet_solve, plan_bench, tour_search_bench
+from bench import (
+    clearance_bench,
+    facet_solve,
+    observe_bench,
+    plan_bench,
+    ray_bench,
+    tour_bench,
+    tour_search_bench,
+)
 
 BENCHES = {
     "facets": facet_solve.main,
     "clearance": clearance_bench.main,
+    "rays": ray_bench.main,
     "plans": plan_bench.main,
+    "observe": observe_bench.main,
+    "tour": tour_bench.main,
     "tour-search": tour_search_bench.main,
 }
 

@@ -21,13 +21,14 @@ import numpy as np
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.bvh import build_surface_index
 from landing_cli.body.gravity.point_mass import point_mass_field
+from landing_cli.body.landing_site import Site
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.plan.bezier import plan_bezier
 from landing_cli.plan.grid_search import Found, search_guide_points
 from landing_cli.plan.guide_candidates import GuideSearch, heights, prepare_search
 from landing_cli.plan.pseudospectral import plan_pseudospectral
-from landing_cli.plan.records import BezierOptions, PlanCase, PseudospectralOptions, Site
+from landing_cli.plan.records import BezierOptions, PlanCase, PseudospectralOptions
 from landing_cli.sources.shape_files import read_shape
 
 GM = 4.4628e5

@@ -13,6 +13,7 @@ from landing_cli.parallel.plan import WorkPlan, pin_blas_threads
 pin_blas_threads()
 
 from validation_domain import Runs, domains, draw_delta_v, facts, verification  # noqa: E402
+from validation_observe import observed_landings  # noqa: E402
 from validation_plan import landing_plans  # noqa: E402
 from validation_section import claims, draw_azimuths, sections, sweep_all  # noqa: E402
 from validation_solver import against_truth, families  # noqa: E402
@@ -37,8 +38,8 @@ version is read back, an unfinished one continued), and computes this page. A re
 the solver within one version: delete `runs/*.h5` first, then. From nothing it takes of the order of ten minutes on
 two cores, from stored results about half of that.
 
-Section 8 needs a reference shape, the search of section 9 a reference catalogue (`LANDING_REFERENCE_DATA`); they take a
-few minutes more. No other table here does:
+Sections 8 and 9 need a reference shape, the search of section 10 a reference catalogue (`LANDING_REFERENCE_DATA`);
+they take some minutes more. No other table here does:
 the truth tables carry their own inputs. The paper's replicas on the radar meshes (`configs/published/`) do need them,
 and are not part of this page.
 """
@@ -83,6 +84,8 @@ def main() -> None:
     parts += [against_truth(), families(runs["bennu"]), claims(swept)]
     say("plans to one site")
     parts.append(landing_plans())
+    say("landings that see")
+    parts.append(observed_landings())
     say("tours of asteroids")
     parts.append(flyby_tours(say))
     (DOCS / "validation.md").write_text(page(parts), encoding="utf-8")

@@ -42,7 +42,7 @@ def flyby_tours(say: Callable[[str], None]) -> str:
     loaded = load_tour(str(ROOT / "configs" / "published" / "liu2023-ce5.yaml"))
     compared = _run("compare", loaded, options)
     assert isinstance(escape, EscapeRun)
-    return f"""## 9. Asteroids on the way
+    return f"""## 10. Asteroids on the way
 
 `configs/published/liu2023-ce5.yaml`, beside Liu, Chen and Zhang (2023), "the paper" of this section.
 

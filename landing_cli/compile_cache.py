@@ -12,7 +12,7 @@ import stat
 from pathlib import Path
 from typing import Any
 
-ROOMS = ("body", "flight", "optimize", "reach", "plan", "tour")
+ROOMS = ("body", "flight", "optimize", "reach", "plan", "observe", "tour")
 # LLVM's first level: a fifth off the compilation, and the kernels run as fast.
 OPTIMISATION_LEVEL = "1"
 

@@ -36,8 +36,9 @@ ROOMS: dict[str, set[str]] = {
     "results": TOOLS,
     "reach": RECORDS,
     "plan": RECORDS,
+    "observe": RECORDS,
     "tour": RECORDS,
-    "cli": {"reach", "plan", "tour", *RECORDS},
+    "cli": {"reach", "plan", "observe", "tour", *RECORDS},
 }
 # library -> the only place that knows it
 LIBRARIES = {

@@ -73,12 +73,17 @@ def test_every_key_is_described_and_carries_its_unit() -> None:
         "c21",
         "s21",
         "normal",
+        "sun_direction",
+        "eccentricity",
+        "mean_per_cluster",
+        "weight",
     }
     for definition in [*schema["$defs"].values(), schema]:
         for key, value in definition["properties"].items():
             assert value.get("description"), key
             number = "number" in json.dumps({k: v for k, v in value.items() if k != "description"})
-            suffixes = ("_m", "_km", "_s", "_h", "_deg", "_kg", "_n", "_m3", "_s2", "_rad_s", "_m_s")
+            suffixes = ("_m", "_km", "_s", "_h", "_deg", "_kg", "_n", "_au", "_hz", "_m3", "_s2", "_s3")
+            suffixes += ("_rad_s", "_m_s")
             assert not number or key in without_unit or key.endswith(suffixes), key
 
 

@@ -89,13 +89,15 @@ def request_of_source(command: str, source: Source, voice: Console) -> Request:
     return request_of(command, loaded)
 
 
-def site_override(text: str) -> str:
+def site_override(text: str, section: str = "plan") -> str:
     """Turn ``--site`` into the scenario key that it stands for.
 
     Parameters
     ----------
     text : str
         ``facet:17``, ``lon,lat`` in degrees, or ``x,y,z:nx,ny,nz`` in metres.
+    section : {"plan", "observe"}
+        Of the scenario.
 
     Returns
     -------
@@ -108,12 +110,12 @@ def site_override(text: str) -> str:
         It is of none of the three forms.
     """
     if found := _FACET.fullmatch(text):
-        return f"plan.site={{facet: {found[1]}}}"
+        return f"{section}.site={{facet: {found[1]}}}"
     if found := _FREE.fullmatch(text):
         position, normal = ", ".join(found.groups()[:3]), ", ".join(found.groups()[3:])
-        return f"plan.site={{position_m: [{position}], normal: [{normal}]}}"
+        return f"{section}.site={{position_m: [{position}], normal: [{normal}]}}"
     if found := _LON_LAT.fullmatch(text):
-        return f"plan.site={{lon_lat_deg: [{found[1]}, {found[2]}]}}"
+        return f"{section}.site={{lon_lat_deg: [{found[1]}, {found[2]}]}}"
     raise UsageError(
         f"{text[:60]!r} is no site",
         where="--site",

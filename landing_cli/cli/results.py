@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from landing_cli.cli import console, plan, reach, tour
+from landing_cli.cli import console, observe, plan, reach, tour
 from landing_cli.cli.options import Force, Jobs, Json, Output, Quiet, ResultFile, new_group
 from landing_cli.errors import InputRefused, OutputRefused, UsageError, VerificationFailed
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 app = new_group("Look at, export, draw, verify and compare result files.")
 
 # missions whose results this version reads: how to print them; each brings stored, figures, verify
-MISSIONS: dict[str, ModuleType] = {"reach": reach, "plan": plan, "tour": tour}
+MISSIONS: dict[str, ModuleType] = {"reach": reach, "plan": plan, "observe": observe, "tour": tour}
 
 CaseName = Annotated[
     str | None,
@@ -43,6 +43,8 @@ class ExportedTable(StrEnum):
     TRAJECTORY = "trajectory"
     SUMMARY = "summary"
     FLYBYS = "flybys"
+    LANDMARKS = "landmarks"
+    VIEW = "view"
 
 
 class ExportFormat(StrEnum):
@@ -119,7 +121,7 @@ def export(
     run: ResultFile,
     table: Annotated[
         ExportedTable | None,
-        typer.Option(help="What; facets unless given (of a plan: trajectory, of a tour: summary)."),
+        typer.Option(help="What; facets unless given (of a plan: trajectory; else: summary)."),
     ] = None,
     case: CaseName = None,
     facet: Facet = None,

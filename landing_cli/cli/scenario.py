@@ -117,6 +117,7 @@ def _landing_facts(loaded: LoadedScenario) -> dict[str, object]:
         "rotation_rate_rad_s": built.asteroid.rotation_rate_rad_s,
         **_reach_facts(loaded.scenario, built),
         **_plan_facts(loaded, built),
+        **_observe_facts(loaded, built),
         "shape_sha256": built.shape_sha256,
     }
 
@@ -149,6 +150,23 @@ def _plan_facts(loaded: LoadedScenario, built: Built) -> dict[str, object]:
         "site_facet": cases[0].site.facet,
         "clearance_m": round(cases[0].clearance_m, 3),
         "plans": [case.name for case in cases],
+    }
+
+
+def _observe_facts(loaded: LoadedScenario, built: Built) -> dict[str, object]:
+    """Check the observation section against the mesh and the landmarks, and tell what it comes to."""
+    if loaded.scenario.observe is None:
+        return {}
+    from landing_cli.observe.cases import observe_case
+    from landing_cli.observe.landmark_source import with_landmarks_hash
+
+    case = observe_case(with_landmarks_hash(loaded), built.asteroid, built.spacecraft)
+    return {
+        "observe_site_m": [round(float(x), 3) for x in case.frame.origin_m],
+        "observe_site_facet": case.frame.facet,
+        "observe_start_m": [round(float(x), 3) for x in case.position_m],
+        "landmarks": len(case.landmarks.position_m),
+        "illumination": case.sun_direction is not None and case.sensor.kind == "camera",
     }
 
 

@@ -82,7 +82,7 @@ def fly_linear_arcs(
     u = thrust_acceleration_m_s2
     pull = (1.0 - GAUSS_C[:, None]) * u[:-1, None, :] + GAUSS_C[:, None] * u[1:, None, :]
     r0, v0 = states[:, None, :3], states[:, None, 3:]
-    by_v, by_r = _frame_slopes(rotation_rate_rad_s)
+    by_v, by_r = frame_slopes(rotation_rate_rad_s)
 
     def residual(K: FloatArray) -> tuple[FloatArray, FloatArray]:
         r = r0 + h * GAUSS_C[:, None] * v0 + h * h * (_AA @ K)
@@ -168,8 +168,19 @@ def slopes_between(arcs: Arcs, arc: NDArray[np.int64], share: FloatArray, along:
     return np.asarray(slope)
 
 
-def _frame_slopes(w: float) -> tuple[FloatArray, FloatArray]:
-    """Coriolis acceleration by velocity and centrifugal acceleration by position."""
+def frame_slopes(w: float) -> tuple[FloatArray, FloatArray]:
+    """Return the slopes of the Coriolis acceleration by velocity and of the centrifugal one by position.
+
+    Parameters
+    ----------
+    w : float, rad/s
+        Spin rate about +z.
+
+    Returns
+    -------
+    by_v : (3, 3) float, 1/s
+    by_r : (3, 3) float, 1/s2
+    """
     return np.array([[0.0, 2.0 * w, 0.0], [-2.0 * w, 0.0, 0.0], [0.0] * 3]), np.diag([w * w, w * w, 0.0])
 
 

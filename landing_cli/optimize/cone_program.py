@@ -111,7 +111,7 @@ def solve_cone_program(
     """
     options = options or ConeOptions()
     x, rows = np.array(start, dtype=np.float64), program.smooth(start)
-    held = _blocks_violation(program, x) <= 1e-6
+    held = blocks_violation(program.blocks, x) <= 1e-6
     fixed = stacked(program.blocks)
     trust, price, rounds, cuts = options.trust, options.price, 0, no_cuts(len(x))
     step = ConvexStep("", None, 0.0, 0.0, np.zeros(len(rows.equality)), np.zeros(len(rows.inequality)))
@@ -161,10 +161,10 @@ def solve_cone_program(
     return ended("unresolved", f"not converged after {rounds} rounds")
 
 
-def _blocks_violation(program: ConeProgram, x: FloatArray) -> float:
-    """Largest violation of the fixed blocks."""
+def blocks_violation(blocks: tuple[ConeBlock, ...], x: FloatArray) -> float:
+    """Largest violation of fixed blocks at a point x (n,)."""
     worst = 0.0
-    for block in program.blocks:
+    for block in blocks:
         values = block.offset + block.matrix @ x
         if block.kind == "zero":
             worst = max(worst, largest(np.abs(values)))

@@ -68,17 +68,25 @@ class Stack:
 
 def stacked(blocks: Sequence[ConeBlock]) -> Stack:
     """Stack blocks, first on top; done once for the blocks that stay from round to round."""
-    rows, columns, values, cones, first = [], [], [], [], 0
+    none = np.zeros(0, dtype=np.int64)
+    rows, columns, values, offsets = [none], [none], [np.zeros(0)], [np.zeros(0)]
+    cones, first = [], 0
     for block in blocks:
         entries, count = block.matrix.tocoo(), len(block.offset)
         rows.append(entries.coords[0] + first)
         columns.append(entries.coords[1])
         values.append(entries.data)
+        offsets.append(block.offset)
         size = block.size if block.kind == "second_order" else max(count, 1)
         cones.append((block.kind, size, count // size))
         first += count
-    offset = np.concatenate([block.offset for block in blocks])
-    return Stack(np.concatenate(rows), np.concatenate(columns), np.concatenate(values), offset, tuple(cones))
+    return Stack(
+        np.concatenate(rows),
+        np.concatenate(columns),
+        np.concatenate(values),
+        np.concatenate(offsets),
+        tuple(cones),
+    )
 
 
 def convex_step(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.bvh import SurfaceIndex
+from landing_cli.body.landing_site import Site
 from landing_cli.flight.legs import AccelerationLeg
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.flight.trajectory import Trajectory
@@ -26,25 +27,6 @@ Parameter = float | int | str | bool | None | list[float] | list[list[float]] | 
 
 CHECK_SAMPLES = 2001
 """Samples, even in time, at which a plan is checked again before it is called planned."""
-
-
-@dataclass(frozen=True, eq=False)
-class Site:
-    """Where a plan lands.
-
-    Attributes
-    ----------
-    position_m : (3,) float, m, body frame
-        r_f (Lyu 2026, Table 1).
-    normal : (3,) float, body frame
-        n_f: outward unit normal of the landing plane.
-    facet : int
-        Facet of the mesh, 0-based; -1 where position and normal were given freely.
-    """
-
-    position_m: FloatArray
-    normal: FloatArray
-    facet: int = -1
 
 
 @dataclass(frozen=True, eq=False)

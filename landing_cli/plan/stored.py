@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.bvh import SurfaceIndex, build_surface_index
 from landing_cli.body.gravity.field import GravityField
+from landing_cli.body.landing_site import Site
 from landing_cli.errors import InputRefused
 from landing_cli.flight.legs import AccelerationLeg
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.flight.trajectory import Trajectory
 from landing_cli.plan.assess import sampled_flight
-from landing_cli.plan.records import Plan, PlanCase, PlanStatus, Site
+from landing_cli.plan.records import Plan, PlanCase, PlanStatus
 from landing_cli.plan.stored_legs import (
     LEG_DATA,
     kind_of,

@@ -17,6 +17,7 @@ from landing_cli.results.columns import Column
 Attribute = str | int | float | tuple[str, ...] | NDArray[Any]
 
 COMPONENTS: Mapping[str, tuple[str, ...]] = {
+    "xy": ("x", "y"),
     "xyz": ("x", "y", "z"),
     "costate": ("rx", "ry", "rz", "vx", "vy", "vz", "m"),
 }

@@ -21,6 +21,7 @@ from landing_cli.scenario.schema_base import (
     wrong,
 )
 from landing_cli.scenario.schema_body import Body
+from landing_cli.scenario.schema_observe import ObserveSection
 from landing_cli.scenario.schema_plan import PlanSection
 from landing_cli.scenario.schema_tour import TourScenario
 from landing_cli.scenario.translate import problems_of
@@ -201,11 +202,16 @@ class Scenario(Section):
     spacecraft: SpacecraftSection = Field(description="the lander")
     reach: Reach | None = Field(None, description="the reachable domain: `reach run`")
     plan: PlanSection | None = Field(None, description="the flight to one site: `plan bezier` and others")
+    observe: ObserveSection | None = Field(
+        None, description="the landing that sees its landmarks: `plan observe`"
+    )
 
     def model_post_init(self, context: Any, /) -> None:
-        """Refuse a scenario that asks nothing."""
-        if self.reach is None and self.plan is None:
-            raise wrong("reach", "is missing, and so is plan", "a scenario asks for one of them, or for both")
+        """Refuse a scenario that asks nothing, and a fit to a field that needs none."""
+        if self.reach is None and self.plan is None and self.observe is None:
+            raise wrong(
+                "reach", "is missing, and so are plan and observe", "a scenario asks for at least one"
+            )
 
 
 AnyScenario = Scenario | TourScenario

@@ -16,7 +16,8 @@ Positive3 = tuple[
 Seconds = Annotated[float, Field(gt=0, le=1e7)]
 
 
-def _as_tuple(value: Any) -> Any:
+def as_tuple(value: Any) -> Any:
+    """Make a list, or a number that stands for a list of one, what a strict tuple accepts."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return (value,)
     return tuple(value) if isinstance(value, list) else value
@@ -30,7 +31,7 @@ def word_or_value(value: Any) -> str:
 Times = Annotated[
     tuple[Seconds, ...],
     Field(min_length=1, max_length=1000),
-    BeforeValidator(_as_tuple, json_schema_input_type=Seconds | list[Seconds]),
+    BeforeValidator(as_tuple, json_schema_input_type=Seconds | list[Seconds]),
 ]
 Auto = Annotated[Literal["auto"], Tag("word")]
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from landing_cli.scenario.schema_base import Section, exactly_one, wrong
+from landing_cli.scenario.schema_base import Number3, Section, exactly_one, wrong
 
 SECONDS_PER_HOUR = 3600.0
 MODELS = "point_mass | harmonics | dipole | polyhedron"
@@ -87,6 +87,22 @@ class Pole(Section):
     w0_deg: float = Field(0.0, ge=-360, le=360, description="prime meridian angle W at the epoch, deg")
 
 
+class Orbit(Section):
+    """Heliocentric osculating elements, ecliptic and equinox J2000: where the sun stands."""
+
+    semi_major_axis_au: float = Field(gt=0, le=1e3, description="semi-major axis, au")
+    eccentricity: float = Field(ge=0, lt=1, description="eccentricity")
+    inclination_deg: float = Field(ge=0, le=180, description="inclination, deg")
+    ascending_node_deg: float = Field(ge=-360, le=360, description="longitude of the ascending node, deg")
+    perihelion_argument_deg: float = Field(ge=-360, le=360, description="argument of perihelion, deg")
+    mean_anomaly_deg: float = Field(ge=-360, le=360, description="mean anomaly at the elements' epoch, deg")
+    epoch_utc: str = Field(description="epoch of the elements, UTC, as 2029-04-13T21:46:00")
+
+    def model_post_init(self, context: Any, /) -> None:
+        """Refuse an epoch that is no date."""
+        _check_epoch(self.epoch_utc)
+
+
 class Body(Section):
     """The asteroid: shape, spin and gravity."""
 
@@ -106,12 +122,32 @@ class Body(Section):
     gravity: AnyGravity = Field(description="gravity model that the solvers fly in")
     epoch_utc: str | None = Field(None, description="time of the initial state, UTC, as 2029-04-13T21:46:00")
     pole: Pole | None = Field(None, description="spin pole, where an inertial frame matters")
+    orbit: Orbit | None = Field(
+        None, description="heliocentric orbit, where light matters; with epoch_utc and pole"
+    )
+    sun_direction: Number3 | None = Field(
+        None,
+        description="direction to the sun, body frame, at the initial time; of any length; instead of orbit",
+    )
 
     def model_post_init(self, context: Any, /) -> None:
-        """Refuse two spins, none, or an epoch that is no date."""
+        """Refuse two spins, none, an epoch that is no date, two suns, or half of one."""
         exactly_one(self, "rotation_period_h", "rotation_rate_rad_s")
         if self.epoch_utc is not None:
             _check_epoch(self.epoch_utc)
+        if self.sun_direction is not None and not any(self.sun_direction):
+            raise wrong("sun_direction", "is zero", "give the direction from the body to the sun")
+        if self.sun_direction is not None and max(map(abs, self.sun_direction)) > 1e15:
+            raise wrong("sun_direction", "is longer than any way to the sun", "give a unit vector, or metres")
+        if self.orbit is None:
+            return
+        if self.sun_direction is not None:
+            raise wrong("sun_direction", "stands beside orbit", "give one of them")
+        for name in ("epoch_utc", "pole"):
+            if getattr(self, name) is None:
+                raise wrong(
+                    name, "is missing", "orbit needs it: the sun's direction in the body frame follows"
+                )
 
     @property
     def spin_rad_s(self) -> float:

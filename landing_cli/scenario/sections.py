@@ -6,9 +6,10 @@ from landing_cli.errors import InputRefused
 from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.messages import Problem, refusal
 from landing_cli.scenario.schema import Reach, Scenario
+from landing_cli.scenario.schema_observe import ObserveSection
 from landing_cli.scenario.schema_plan import PlanSection
 
-MISSIONS = ("reach", "plan")
+MISSIONS = ("reach", "plan", "observe")
 
 
 def reach_section(loaded: LoadedScenario) -> Reach:
@@ -55,6 +56,29 @@ def plan_section(loaded: LoadedScenario) -> PlanSection:
     return loaded.scenario.plan
 
 
+def observe_section(loaded: LoadedScenario) -> ObserveSection:
+    """Return what a scenario says for ``plan observe``.
+
+    Parameters
+    ----------
+    loaded : LoadedScenario
+        The checked scenario.
+
+    Returns
+    -------
+    ObserveSection
+
+    Raises
+    ------
+    InputRefused
+        It has no such section.
+    """
+    if loaded.scenario.observe is None:
+        fix = "`plan observe` needs initial_state, site, tof_s, landmarks, sensor and prior there"
+        raise _missing(loaded, "observe", fix)
+    return loaded.scenario.observe
+
+
 def for_mission(scenario: Scenario, mission: str) -> Scenario:
     """Drop the sections of other missions: what they say changes no number of this one.
 
@@ -62,7 +86,7 @@ def for_mission(scenario: Scenario, mission: str) -> Scenario:
     ----------
     scenario : Scenario
         All of it.
-    mission : {"reach", "plan"}
+    mission : {"reach", "plan", "observe"}
         Whose section stays.
 
     Returns

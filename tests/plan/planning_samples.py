@@ -12,9 +12,10 @@ from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.bvh import build_surface_index
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.body.gravity.polyhedron import polyhedron_field
+from landing_cli.body.landing_site import Site
 from landing_cli.body.mesh import Mesh, facet_centroids, facet_normals
 from landing_cli.flight.spacecraft import Spacecraft
-from landing_cli.plan.records import PlanCase, Site
+from landing_cli.plan.records import PlanCase
 from landing_cli.sources.shape_files import read_shape
 
 EROS_GM = 4.4628e5

@@ -72,7 +72,7 @@ def test_a_scenario_may_have_either_section_or_both_but_not_none(folder: Path, t
         InputRefused, match=r"probe.yaml: plan: the scenario has no such section; `plan` needs"
     ):
         plan_section(reached)
-    with pytest.raises(InputRefused, match=r"reach: is missing, and so is plan"):
+    with pytest.raises(InputRefused, match=r"reach: is missing, and so are plan and observe"):
         load(str(folder / "lumpy.yaml"), ["plan=null"])
 
 

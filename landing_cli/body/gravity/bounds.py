@@ -109,6 +109,8 @@ def _refuse_masses_outside(field: GravityField, radius: float, semi_axes: FloatA
         masses = np.array([[*field.params[1:3], 0.0], [*field.params[4:6], 0.0]])
     elif field.kind == GravityKind.POLYHEDRON:
         masses = recorded_corners(field.params)
+    elif field.kind == GravityKind.INTERPOLATED:
+        masses = recorded_corners(field.params[int(field.params[0]) :])
     inside = np.linalg.norm(masses, axis=1) < radius
     if semi_axes is not None:
         # a vertex may touch the least ellipsoid

@@ -19,6 +19,7 @@ class GravityKind(IntEnum):
     HARMONICS = 1
     DIPOLE = 2
     POLYHEDRON = 3
+    INTERPOLATED = 4
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.body.gravity.field import GravityField
-from landing_cli.body.gravity.kernels import acceleration, gradient, potential
+from landing_cli.body.gravity.kernels import acceleration, acceleration_and_gradient, gradient, potential
 from landing_cli.kernel import kernel
 
 FloatArray = NDArray[np.float64]
@@ -74,6 +74,28 @@ def gradients(field: GravityField, points: ArrayLike) -> FloatArray:
     return values
 
 
+def accelerations_and_gradients(field: GravityField, points: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return the acceleration and its gradient at every point, which share their work.
+
+    Parameters
+    ----------
+    field : GravityField
+        The gravity model.
+    points : (n, 3) float, m, body frame
+        Where to evaluate them.
+
+    Returns
+    -------
+    g : (n, 3) float, m/s2, body frame
+    G : (n, 3, 3) float, 1/s2
+        ``[k, i, j]`` is the derivative of component i along axis j.
+    """
+    points = _rows(points)
+    g, G = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
+    _fill_both(int(field.kind), field.params.copy(), points, g, G)
+    return g, G
+
+
 def _rows(points: ArrayLike) -> FloatArray:
     return np.array(points, dtype=np.float64, order="C").reshape(-1, 3)
 
@@ -98,3 +120,15 @@ def _fill_gradients(kind: int, params: FloatArray, points: FloatArray, values: F
         values[i, 0, 0], values[i, 1, 1], values[i, 2, 2] = xx, yy, zz
         values[i, 0, 1], values[i, 0, 2], values[i, 1, 2] = xy, xz, yz
         values[i, 1, 0], values[i, 2, 0], values[i, 2, 1] = xy, xz, yz
+
+
+@kernel
+def _fill_both(kind: int, params: FloatArray, points: FloatArray, g: FloatArray, G: FloatArray) -> None:
+    for i in range(len(points)):
+        gx, gy, gz, xx, yy, zz, xy, xz, yz = acceleration_and_gradient(
+            kind, params, points[i, 0], points[i, 1], points[i, 2]
+        )
+        g[i, 0], g[i, 1], g[i, 2] = gx, gy, gz
+        G[i, 0, 0], G[i, 1, 1], G[i, 2, 2] = xx, yy, zz
+        G[i, 0, 1], G[i, 0, 2], G[i, 1, 2] = xy, xz, yz
+        G[i, 1, 0], G[i, 2, 0], G[i, 2, 1] = xy, xz, yz

@@ -3,6 +3,7 @@
 Every function takes ``(kind, params, x, y, z)``: ``int(field.kind)``, ``field.params`` and a position in
 the body frame, m. Call them with exactly these types, so that each compiles once. Second derivatives are
 ordered xx, yy, zz, xy, xz, yz. Nothing is allocated, and a position at a singularity gives inf or nan.
+Where an interpolated field has no piece, its polyhedron answers.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from landing_cli.body.gravity.harmonics import (
     harmonics_curvature,
     harmonics_potential,
 )
+from landing_cli.body.gravity.interpolated_kernels import fitted_values
 from landing_cli.body.gravity.kernel_types import Params, Symmetric, Vector, VectorAndSymmetric
 from landing_cli.body.gravity.point_mass import (
     point_acceleration,
@@ -38,6 +40,7 @@ from landing_cli.kernel import kernel
 _POINT_MASS = int(GravityKind.POINT_MASS)
 _HARMONICS = int(GravityKind.HARMONICS)
 _DIPOLE = int(GravityKind.DIPOLE)
+_INTERPOLATED = int(GravityKind.INTERPOLATED)
 
 
 @kernel
@@ -49,6 +52,11 @@ def potential(kind: int, params: Params, x: float, y: float, z: float) -> float:
         return harmonics_potential(params, x, y, z)
     if kind == _DIPOLE:
         return dipole_potential(params, x, y, z)
+    if kind == _INTERPOLATED:
+        fitted = fitted_values(params, x, y, z)
+        if fitted[0]:
+            return fitted[1]
+        params = params[int(params[0]) :]
     return polyhedron_potential(params, x, y, z)
 
 
@@ -61,6 +69,11 @@ def acceleration(kind: int, params: Params, x: float, y: float, z: float) -> Vec
         return harmonics_acceleration(params, x, y, z)
     if kind == _DIPOLE:
         return dipole_acceleration(params, x, y, z)
+    if kind == _INTERPOLATED:
+        fitted = fitted_values(params, x, y, z)
+        if fitted[0]:
+            return fitted[2], fitted[3], fitted[4]
+        params = params[int(params[0]) :]
     return polyhedron_acceleration(params, x, y, z)
 
 
@@ -73,6 +86,21 @@ def acceleration_and_gradient(kind: int, params: Params, x: float, y: float, z: 
         return harmonics_acceleration_and_gradient(params, x, y, z)
     if kind == _DIPOLE:
         return dipole_acceleration_and_gradient(params, x, y, z)
+    if kind == _INTERPOLATED:
+        fitted = fitted_values(params, x, y, z)
+        if fitted[0]:
+            return (
+                fitted[2],
+                fitted[3],
+                fitted[4],
+                fitted[5],
+                fitted[6],
+                fitted[7],
+                fitted[8],
+                fitted[9],
+                fitted[10],
+            )
+        params = params[int(params[0]) :]
     return polyhedron_acceleration_and_gradient(params, x, y, z)
 
 
@@ -94,4 +122,6 @@ def curvature(
         return harmonics_curvature(params, x, y, z, lx, ly, lz)
     if kind == _DIPOLE:
         return dipole_curvature(params, x, y, z, lx, ly, lz)
+    if kind == _INTERPOLATED:
+        params = params[int(params[0]) :]
     return polyhedron_curvature(params, x, y, z, lx, ly, lz)

@@ -1,0 +1,1 @@
+"""`plan observe`: landings bent towards the landmarks that they navigate by."""
