@@ -1,4 +1,4 @@
-"""``python -m bench [facets | clearance | rays | plans | observe | tour | tour-search]``: ours and the usual."""
+"""``python -m bench [facets | clearance | rays | plans | observe | tour | tour-search]``, or all of them."""
 
 from __future__ import annotations
 

@@ -7,16 +7,12 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from landing_cli.flight.astronomy import OBLIQUITY_RAD
+from landing_cli.flight.elements import OrbitElements, states_at
 from landing_cli.observe.records import Landmarks, Sensor
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-
-GM_SUN_M3_S2 = 1.32712440041e20
-"""Of DE440 (Park et al., The Astronomical Journal 161:105, 2021)."""
-
-OBLIQUITY_RAD = math.radians(84381.448 / 3600.0)
-"""Of the ecliptic of J2000 (IAU 1976), which published elements refer to."""
 
 
 def is_light_needed(sensor: Sensor, sun_direction: FloatArray | None) -> bool:
@@ -142,38 +138,20 @@ def heliocentric_position_m(
     (3,) float, m, ICRF
         On the unperturbed ellipse: planets move a near-Earth body from it by some 0.1 deg in a decade.
     """
-    motion = math.sqrt(GM_SUN_M3_S2 / semi_major_axis_m**3)
-    anomaly = _eccentric_anomaly(mean_anomaly_rad + motion * elapsed_s, eccentricity)
-    x = semi_major_axis_m * (math.cos(anomaly) - eccentricity)
-    y = semi_major_axis_m * math.sqrt(1.0 - eccentricity**2) * math.sin(anomaly)
-    in_ecliptic = _about_z(ascending_node_rad) @ _about_x(inclination_rad)
-    to_icrf = _about_x(OBLIQUITY_RAD) @ in_ecliptic @ _about_z(perihelion_argument_rad)
-    return np.asarray(to_icrf @ [x, y, 0.0])
-
-
-def _eccentric_anomaly(mean_rad: float, eccentricity: float) -> float:
-    """Solve Kepler's equation E - e sin E = M by Newton's method, held between M - e and M + e."""
-    mean = math.remainder(mean_rad, 2.0 * math.pi)
-    low, high = mean - eccentricity, mean + eccentricity
-    anomaly = mean + eccentricity * math.sin(mean)
-    for _ in range(100):
-        miss = anomaly - eccentricity * math.sin(anomaly) - mean
-        low, high = (low, anomaly) if miss > 0.0 else (anomaly, high)
-        step = miss / (1.0 - eccentricity * math.cos(anomaly))
-        following = anomaly - step
-        if not low <= following <= high:
-            following = 0.5 * (low + high)
-        if abs(following - anomaly) <= 1e-15 * max(1.0, abs(anomaly)):
-            return following
-        anomaly = following
-    return anomaly
-
-
-def _about_z(angle: float) -> FloatArray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _about_x(angle: float) -> FloatArray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    ellipse = OrbitElements(
+        np.zeros(1),
+        *(
+            np.array([value])
+            for value in (
+                semi_major_axis_m,
+                eccentricity,
+                inclination_rad,
+                ascending_node_rad,
+                perihelion_argument_rad,
+                mean_anomaly_rad,
+            )
+        ),
+    )
+    x, y, z = states_at(ellipse, elapsed_s)[0, :3]
+    cosine, sine = math.cos(OBLIQUITY_RAD), math.sin(OBLIQUITY_RAD)
+    return np.array([x, cosine * y - sine * z, sine * y + cosine * z])

@@ -9,16 +9,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from landing_cli.flight.astronomy import AU_M, GM_SUN_M3_S2, OBLIQUITY_RAD
 from landing_cli.observe.illumination import (
-    GM_SUN_M3_S2,
-    OBLIQUITY_RAD,
     body_axes,
     heliocentric_position_m,
     sun_direction,
     sun_directions,
 )
-
-AU_M = 149_597_870_700.0
 
 
 def test_body_axes_are_those_of_the_iau_definition():
@@ -78,7 +75,7 @@ def test_the_ellipse_obeys_newton(eccentricity):
         assert np.linalg.norm(found - to_icrf @ ecliptic) < 5e-10 * a
         mean = 2.0 * math.pi * t / period
         same = heliocentric_position_m(a, eccentricity, inclination, node, argument, mean - 40 * math.pi, 0.0)
-        assert np.linalg.norm(found - same) < 1e-12 * a
+        assert np.linalg.norm(found - same) < 1e-11 * a  # at e = 0.999 beta is a difference of large numbers
 
 
 def test_the_earth_at_the_march_equinox():
