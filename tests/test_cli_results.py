@@ -150,10 +150,10 @@ def test_what_is_no_result_is_refused_by_name(
 def test_a_result_of_another_mission_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from landing_cli.results.tree import Group
 
-    identity = RunIdentity("tour search", "name: x\n", "", "9.9.9")
-    write(tmp_path / "t.h5", Group({}), {"mission": "tour", "complete": 1, **identity.as_dict()}, {})
+    identity = RunIdentity("swim across", "name: x\n", "", "9.9.9")
+    write(tmp_path / "t.h5", Group({}), {"mission": "swim", "complete": 1, **identity.as_dict()}, {})
     assert main("landing", ["results", "show", str(tmp_path / "t.h5")]) == ExitCode.REFUSED
-    assert "holds a result of 'tour', which this version does not read" in capsys.readouterr().err
+    assert "holds a result of 'swim', which this version does not read" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

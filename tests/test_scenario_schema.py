@@ -10,8 +10,15 @@ import pytest
 from scenario_samples import MINIMAL, SHIPPED, write_minimal
 
 from landing_cli.errors import InputRefused
-from landing_cli.scenario.load import load, parse
-from landing_cli.scenario.schema import Scenario, from_tree, json_schema, to_tree
+from landing_cli.scenario.load import load, load_any, parse
+from landing_cli.scenario.schema import (
+    Scenario,
+    from_tree,
+    is_tour,
+    json_schema,
+    to_tree,
+    tour_from_tree,
+)
 from landing_cli.scenario.show import to_yaml
 
 
@@ -31,11 +38,12 @@ def refusal_of_text(tmp_path: Path, old: str, new: str) -> str:
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_a_shipped_scenario_survives_the_way_through_yaml_and_json(path: Path, tmp_path: Path) -> None:
-    scenario = load(str(path)).scenario
+    scenario = load_any(str(path)).scenario
     again = tmp_path / "again.yaml"
     again.write_text(to_yaml(scenario, "A comment"))
-    assert load(str(again)).scenario == scenario
-    assert from_tree(json.loads(json.dumps(to_tree(scenario)))) == scenario
+    assert load_any(str(again)).scenario == scenario
+    tree = json.loads(json.dumps(to_tree(scenario)))
+    assert (tour_from_tree(tree) if is_tour(tree) else from_tree(tree)) == scenario
 
 
 def test_the_yaml_shows_every_key_of_the_schema(tmp_path: Path) -> None:
@@ -77,12 +85,16 @@ def test_every_key_is_described_and_carries_its_unit() -> None:
         "eccentricity",
         "mean_per_cluster",
         "weight",
+        "absolute_magnitude_max",
+        "albedo",
     }
-    for definition in [*schema["$defs"].values(), schema]:
+    for definition in schema["$defs"].values():
         for key, value in definition["properties"].items():
             assert value.get("description"), key
-            number = "number" in json.dumps({k: v for k, v in value.items() if k != "description"})
-            suffixes = ("_m", "_km", "_s", "_h", "_deg", "_kg", "_n", "_au", "_hz", "_m3", "_s2", "_s3")
+            number = "number" in json.dumps(
+                {k: v for k, v in value.items() if k not in ("description", "default")}
+            )
+            suffixes = ("_m", "_km", "_s", "_h", "_d", "_deg", "_kg", "_n", "_au", "_hz", "_m3", "_s2", "_s3")
             suffixes += ("_rad_s", "_m_s")
             assert not number or key in without_unit or key.endswith(suffixes), key
 

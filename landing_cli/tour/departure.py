@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 def departure_from_polar(
     t_s: float, distance_m: float, angle_rad: float, radial_speed_m_s: float, ephemeris: Ephemeris
 ) -> Departure:
-    """Depart from a point in the ecliptic with a radial velocity (the two numbers that Liu 2023 leaves open).
+    """Depart from a point in the ecliptic with a radial velocity: numbers that a paper leaves to be inferred.
 
     Parameters
     ----------

@@ -42,6 +42,10 @@ from landing_cli.tour.summary import best_first
 
 COMPILING = "compiling the kernels (once after an installation; about half a minute)"
 SEARCHED = "search"
+BEYOND = 10.0
+"""Where nothing keeps to the limit: how many times its delta-v is searched for what came nearest."""
+
+Run = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[tuple[int, Any]]]
 
 Windows = Sequence[tuple[float, float]]
 Found = tuple[FlybyChain, ChainPath | None]
@@ -238,17 +242,28 @@ def _searched(case: TourCase, journal: Journal, plan: WorkPlan, say: Callable[[s
         with closing(run_chunks(work, chunks, plan)) as answers:
             yield from answers
 
+    outcome = _search(case, run, told)
+    if not outcome.chains and outcome.nearest is None:  # nothing at all within the limits: look beyond
+        wider = replace(case.limits, delta_v_m_s=BEYOND * case.limits.delta_v_m_s, asteroids_max=1)
+        beyond = _search(replace(case, limits=wider), run, lambda _: None)
+        outcome = replace(outcome, nearest=_cheapest(beyond))
+    journal.append(SEARCHED, outcome_to_arrays(outcome))
+    return outcome_from_arrays(outcome_to_arrays(outcome))
+
+
+def _search(case: TourCase, run: Run, told: Callable[[DepthReport], None]) -> SearchOutcome:
     asked, options = (case.targets, case.departure, case.limits), case.options
     if isinstance(options, BeamOptions):
         from landing_cli.tour.beam_search import search as search_beam
 
-        outcome = search_beam(*asked, options, case.ephemeris, run=run, progress=told)
-    else:
-        from landing_cli.tour.layered_search import search as search_layers
+        return search_beam(*asked, options, case.ephemeris, run=run, progress=told)
+    from landing_cli.tour.layered_search import search as search_layers
 
-        outcome = search_layers(*asked, options, case.ephemeris, run=run, progress=told)
-    journal.append(SEARCHED, outcome_to_arrays(outcome))
-    return outcome_from_arrays(outcome_to_arrays(outcome))
+    return search_layers(*asked, options, case.ephemeris, run=run, progress=told)
+
+
+def _cheapest(outcome: SearchOutcome) -> FlybyChain | None:
+    return min(outcome.chains, key=lambda chain: chain.delta_v_m_s, default=outcome.nearest)
 
 
 def depth_line(depth: DepthReport) -> str:
@@ -276,7 +291,8 @@ def _flown(
 ) -> tuple[list[Found], dict[str, str]]:
     """Fly chains, each recorded as it comes; take over those that the journal holds."""
     flown = {int(key): chain_from_arrays(a) for key, a in journal.records.items() if key != SEARCHED}
-    progress(len(flown), len(hints))
+    if hints:
+        progress(len(flown), len(hints))
     left = [[index] for index in range(len(hints)) if index not in flown]
     lost: dict[str, str] = {}
     reduced = replace(case, catalogue=case.targets)  # the full one is not sent
