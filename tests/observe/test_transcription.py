@@ -58,10 +58,10 @@ def eros(reference_shapes) -> ObserveCase:
 def test_eros_costs_what_is_known(eros: ObserveCase, count: int) -> None:
     """All four lie 4.0e-8 to 4.9e-8 below the note's figures, where 1e-8 was wanted.
 
-    Shooting by Pontryagin's principle in the exact field agrees with ours to 3e-12, IPOPT in a B-spline of the
-    field (``python -m bench observe``) to 3e-10, and the open-loop flight in the exact field meets the site for
-    less than the note's least: the note's figures are not those of this field. An error of 2e-8 in its gravity
-    would explain them.
+    Shooting by Pontryagin's principle in the exact field agrees with ours to 3e-12, IPOPT in a B-spline of
+    the field (``python -m bench observe``) to 3e-10, and the open-loop flight in the exact field meets the
+    site for less than the note's least: the note's figures are not those of this field. An error of 2e-8 in
+    its gravity would explain them.
     """
     path = steered(eros, count, nodes=200)
     assert path.status == "planned", path.message
