@@ -60,7 +60,7 @@ def test_eros_costs_what_is_known(eros: ObserveCase, count: int) -> None:
 
     Shooting by Pontryagin's principle in the exact field agrees with ours to 3e-12, IPOPT in a B-spline of
     the field (``python -m bench observe``) to 3e-10, and the open-loop flight in the exact field meets the
-    site for less than the reference's least: the reference figures are not those of this field. An error of 2e-8 in
+    site for less than the reference: its figures are not those of this field. An error of 2e-8 in
     its gravity would explain them.
     """
     path = steered(eros, count, nodes=200)
