@@ -14,6 +14,7 @@ from landing_cli.observe.features import ThomasField, thomas_landmarks
 from landing_cli.observe.pareto import EqualEnergy, compare_at_equal_energy
 from landing_cli.observe.pipeline import ground_of, request_of
 from landing_cli.observe.records import ObservedPath
+from landing_cli.observe.tasks import Ground
 from landing_cli.scenario.load import load
 
 SCENARIO = Path(__file__).resolve().parent.parent / "configs" / "published" / "shen2026-eros.yaml"
@@ -25,7 +26,8 @@ FIELD = {"clusters": 3, "mean_per_cluster": 15.0, "spread_m": 12.0, "extent_m": 
 
 def information_study() -> str:
     """The seeds' table, and what it comes to."""
-    fields = {seed: _field(seed) for seed in SEEDS}
+    ground = ground_of(request_of(load(str(SCENARIO), ["observe.gravity=interpolated"])))
+    fields = {seed: _field(ground, seed) for seed in SEEDS}
     pairs = [pair for _, compared in fields.values() for pair in compared]
     ratios = np.array([pair.sigma_ratio for pair in pairs])
     worse = sum(
@@ -49,10 +51,8 @@ informed one spends {spread(energies, "{:.2f}")} of the energy that the paper's 
 """
 
 
-def _field(seed: int) -> tuple[ObservedPath, list[EqualEnergy]]:
+def _field(ground: Ground, seed: int) -> tuple[ObservedPath, list[EqualEnergy]]:
     """Compare on one field of landmarks, in the interpolated field of the polyhedron."""
-    loaded = load(str(SCENARIO), ["observe.gravity=interpolated"])
-    ground = ground_of(request_of(loaded))
     case = ground.solver_case
     landmarks = thomas_landmarks(case.asteroid.mesh, case.surface, case.frame, ThomasField(seed, **FIELD))
     return compare_at_equal_energy(

@@ -61,6 +61,18 @@ def test_the_valley_s_floor_is_found_from_the_slope_alone() -> None:
     assert_allclose(solution.x, 1.0, rtol=1e-5)
 
 
+def test_the_unknown_part_of_the_curvature_is_learnt() -> None:
+    """Steps with the known part alone fall short twelvefold: a hundred rounds and more."""
+    known, rest, c = 6.0 * np.eye(2), np.array([[-5.5, 0.2], [0.2, -5.0]]), np.array([0.1, -0.1])
+    H = known + rest
+    program = CurvedProgram(
+        lambda x: CurvedValue(float(c @ x + 0.5 * x @ H @ x), c + H @ x, known), (), no_rows, np.full(2, 10.0)
+    )
+    solution = solve_curved_program(program, np.zeros(2), TIGHT)
+    assert solution.rounds <= 8
+    assert_allclose(solution.x, -np.linalg.solve(H, c), rtol=1e-5)
+
+
 @pytest.mark.parametrize("start", [(-0.5, 0.3), (3.0, -2.0)])
 def test_a_ball_and_a_curved_wall_against_another_solver(start: tuple[float, float]) -> None:
     """The second start lies outside of both."""

@@ -123,7 +123,8 @@ def compare_at_equal_energy(
         way = SteeringOptions(waypoints=count, timing=options.timing, nodes=options.nodes)
         waypoints = waypoints_of(case, control, nominal.tof_s, way)
         papers.append(least_energy_path(case, nominal.tof_s, waypoints, options.nodes))
-    front = front_about(case, least, [path.performance_index_m2_s3 for path in papers], knots, papers)
+    energies = [path.performance_index_m2_s3 for path in papers]
+    front = front_about(case, least, energies, knots, papers[-1:])
     compared = []
     for count, path in zip(counts, papers, strict=True):
         paper = observed(case, path)

@@ -53,7 +53,7 @@ def landing_case(mesh: Mesh, facet: int, gm: float, spin: float, start_m: Any, *
 
 
 def eros_case(shapes: Path, **changes: Any) -> ObserveCase:
-    """The note's case: facet 6551 of the 7790, the file's own origin, radial frame."""
+    """The reference case: facet 6551 of the 7790, the file's own origin, radial frame."""
     mesh = read_obj_km(shapes / "eros_near_3897.obj")
     return landing_case(mesh, 6551, 4.46311e5, 3.31165e-4, (-60.0, 70.0, 65.0), **changes)
 

@@ -44,8 +44,8 @@ def waypoint_error_m(case: ObserveCase, count: int, positions: np.ndarray, times
     return float(np.abs(case.frame.to_site(positions[at])[:, :2] - wanted.position_m).max())
 
 
-# J of the note, and of indirect shooting (`shot_energy` on this mesh, DOP853 at 1e-12)
-NOTE = {0: 0.0184867024262, 1: 0.0185891584837, 3: 0.0187677562541, 7: 0.0191260955544}
+# J of reference, and of indirect shooting (`shot_energy` on this mesh, DOP853 at 1e-12)
+REFERENCE = {0: 0.0184867024262, 1: 0.0185891584837, 3: 0.0187677562541, 7: 0.0191260955544}
 SHOT = {0: 0.018486701529407, 1: 0.018589157718077}
 
 
@@ -54,17 +54,18 @@ def eros(reference_shapes) -> ObserveCase:
     return eros_case(reference_shapes)
 
 
-@pytest.mark.parametrize("count", NOTE)
+@pytest.mark.parametrize("count", REFERENCE)
 def test_eros_costs_what_is_known(eros: ObserveCase, count: int) -> None:
-    """All four lie 4.0e-8 to 4.9e-8 below the note's figures, where 1e-8 was wanted.
+    """All four lie 4.0e-8 to 4.9e-8 below the reference figures, where 1e-8 was wanted.
 
-    Shooting by Pontryagin's principle in the exact field agrees with ours to 3e-12, and the open-loop flight
-    in the exact field meets the site and costs less than the note's least: the note's figures are not those
-    of this field. An error of 2e-8 in its gravity would explain them.
+    Shooting by Pontryagin's principle in the exact field agrees with ours to 3e-12, IPOPT in a B-spline of
+    the field (``python -m bench observe``) to 3e-10, and the open-loop flight in the exact field meets the
+    site for less than the reference: its figures are not those of this field. An error of 2e-8 in
+    its gravity would explain them.
     """
     path = steered(eros, count, nodes=200)
     assert path.status == "planned", path.message
-    assert path.performance_index_m2_s3 == pytest.approx(NOTE[count], rel=5e-8, abs=0)
+    assert path.performance_index_m2_s3 == pytest.approx(REFERENCE[count], rel=5e-8, abs=0)
     if count in SHOT:
         assert path.performance_index_m2_s3 == pytest.approx(SHOT[count], rel=1e-11, abs=0)
     if count:
@@ -142,7 +143,7 @@ def test_without_forces_the_spline_is_the_optimum() -> None:
 
 
 def test_the_spline_flown_by_inverse_dynamics_costs_a_little_more(eros: ObserveCase) -> None:
-    """The note: 0.7e-4 to 1.3e-4 more than the optimum, exactly feasible."""
+    """Known from elsewhere: 0.7e-4 to 1.3e-4 more than the optimum, exactly feasible."""
     case = eros
     for count in (0, 1, 3, 7):
         flight = energy_flight(case, TOF, passed(case, count), 200)

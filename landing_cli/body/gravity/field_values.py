@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from landing_cli.body.gravity.field import GravityField
+from landing_cli.body.gravity.field import GravityField, GravityKind
+from landing_cli.body.gravity.interpolated_kernels import fitted_into
 from landing_cli.body.gravity.kernels import acceleration, acceleration_and_gradient, gradient, potential
 from landing_cli.kernel import kernel
 
@@ -28,6 +29,11 @@ def potentials(field: GravityField, points: ArrayLike) -> FloatArray:
         Positive: GM/r + ...
     """
     points = _rows(points)
+    if field.kind is GravityKind.INTERPOLATED:
+        held, fitted, rest = _pieces(field, points)
+        values = fitted[:, 0].copy()
+        values[~held] = potentials(rest, points[~held])
+        return values
     values = np.zeros(len(points))
     _fill_potentials(int(field.kind), field.params.copy(), points, values)
     return values
@@ -48,6 +54,11 @@ def accelerations(field: GravityField, points: ArrayLike) -> FloatArray:
     (n, 3) float, m/s2, body frame
     """
     points = _rows(points)
+    if field.kind is GravityKind.INTERPOLATED:
+        held, fitted, rest = _pieces(field, points)
+        values = fitted[:, 1:4].copy()
+        values[~held] = accelerations(rest, points[~held])
+        return values
     values = np.zeros((len(points), 3))
     _fill_accelerations(int(field.kind), field.params.copy(), points, values)
     return values
@@ -69,6 +80,11 @@ def gradients(field: GravityField, points: ArrayLike) -> FloatArray:
         Symmetric; ``[k, i, j]`` is the derivative of component i along axis j.
     """
     points = _rows(points)
+    if field.kind is GravityKind.INTERPOLATED:
+        held, fitted, rest = _pieces(field, points)
+        values = _tensors(fitted)
+        values[~held] = gradients(rest, points[~held])
+        return values
     values = np.zeros((len(points), 3, 3))
     _fill_gradients(int(field.kind), field.params.copy(), points, values)
     return values
@@ -91,6 +107,11 @@ def accelerations_and_gradients(field: GravityField, points: ArrayLike) -> tuple
         ``[k, i, j]`` is the derivative of component i along axis j.
     """
     points = _rows(points)
+    if field.kind is GravityKind.INTERPOLATED:
+        held, fitted, rest = _pieces(field, points)
+        g, G = fitted[:, 1:4].copy(), _tensors(fitted)
+        g[~held], G[~held] = accelerations_and_gradients(rest, points[~held])
+        return g, G
     g, G = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
     _fill_both(int(field.kind), field.params.copy(), points, g, G)
     return g, G
@@ -98,6 +119,18 @@ def accelerations_and_gradients(field: GravityField, points: ArrayLike) -> tuple
 
 def _rows(points: ArrayLike) -> FloatArray:
     return np.array(points, dtype=np.float64, order="C").reshape(-1, 3)
+
+
+def _pieces(field: GravityField, points: FloatArray) -> tuple[NDArray[np.bool_], FloatArray, GravityField]:
+    """Which points the pieces of an interpolated field hold, the values there, and the field elsewhere."""
+    held, fitted = np.zeros(len(points), dtype=np.bool_), np.zeros((len(points), 10))
+    fitted_into(field.params, points, held, fitted)
+    return held, fitted, GravityField(GravityKind.POLYHEDRON, field.params[int(field.params[0]) :])
+
+
+def _tensors(fitted: FloatArray) -> FloatArray:
+    """Gradients (n, 3, 3) from the last six of the fitted values: xx, yy, zz, xy, xz, yz."""
+    return fitted[:, [[4, 7, 8], [7, 5, 9], [8, 9, 6]]]
 
 
 @kernel

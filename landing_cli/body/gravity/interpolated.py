@@ -3,7 +3,7 @@
 The potential is a polynomial on every piece of the box that lies outside the body and could be fitted to
 within the tolerance (`fitted_pieces`); acceleration and gradient are its derivatives, so that the field stays
 conservative. Anywhere else, near edges of facets above all, the polyhedron itself is evaluated: the field is
-nowhere worse than the tolerance.
+nowhere worse than what is measured. Kernels that are handed the field (`kernels`) evaluate the polyhedron.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from landing_cli.body.gravity.kernel_types import FloatArray
 from landing_cli.body.gravity.polyhedron_records import recorded_corners
 from landing_cli.errors import InputRefused
 
-TOLERANCE = 1e-8
+TOLERANCE = 1e-9
 MOST_HALVINGS = 9
 _PROBE_POINTS = 40
 

@@ -6,7 +6,10 @@ The parameters are where the polyhedron's own begin and where the coefficients b
 
 from __future__ import annotations
 
-from landing_cli.body.gravity.kernel_types import Params
+import numpy as np
+from numpy.typing import NDArray
+
+from landing_cli.body.gravity.kernel_types import FloatArray, Params
 from landing_cli.kernel import kernel
 
 DEGREE = 10
@@ -104,3 +107,14 @@ def fitted_values(params: Params, x: float, y: float, z: float) -> Fitted:
         a[2] * ax + a[5] * ay + a[8] * az,
         a[2] * bx + a[5] * by + a[8] * bz,
     )
+
+
+@kernel
+def fitted_into(params: Params, points: FloatArray, held: NDArray[np.bool_], values: FloatArray) -> None:
+    """Write which of (n, 3) points a piece holds (n,), and U, g and its gradient (n, 10) there."""
+    for i in range(len(points)):
+        fitted = fitted_values(params, points[i, 0], points[i, 1], points[i, 2])
+        held[i] = fitted[0]
+        values[i, 0], values[i, 1], values[i, 2], values[i, 3] = fitted[1], fitted[2], fitted[3], fitted[4]
+        values[i, 4], values[i, 5], values[i, 6] = fitted[5], fitted[6], fitted[7]
+        values[i, 7], values[i, 8], values[i, 9] = fitted[8], fitted[9], fitted[10]

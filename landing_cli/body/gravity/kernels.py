@@ -3,7 +3,8 @@
 Every function takes ``(kind, params, x, y, z)``: ``int(field.kind)``, ``field.params`` and a position in
 the body frame, m. Call them with exactly these types, so that each compiles once. Second derivatives are
 ordered xx, yy, zz, xy, xz, yz. Nothing is allocated, and a position at a singularity gives inf or nan.
-Where an interpolated field has no piece, its polyhedron answers.
+Here an interpolated field is the polyhedron that it was fitted to: its pieces answer arrays of points only
+(`field_values`), as every kernel that is compiled with them would compile half as long again.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from landing_cli.body.gravity.harmonics import (
     harmonics_curvature,
     harmonics_potential,
 )
-from landing_cli.body.gravity.interpolated_kernels import fitted_values
 from landing_cli.body.gravity.kernel_types import Params, Symmetric, Vector, VectorAndSymmetric
 from landing_cli.body.gravity.point_mass import (
     point_acceleration,
@@ -53,9 +53,6 @@ def potential(kind: int, params: Params, x: float, y: float, z: float) -> float:
     if kind == _DIPOLE:
         return dipole_potential(params, x, y, z)
     if kind == _INTERPOLATED:
-        fitted = fitted_values(params, x, y, z)
-        if fitted[0]:
-            return fitted[1]
         params = params[int(params[0]) :]
     return polyhedron_potential(params, x, y, z)
 
@@ -70,9 +67,6 @@ def acceleration(kind: int, params: Params, x: float, y: float, z: float) -> Vec
     if kind == _DIPOLE:
         return dipole_acceleration(params, x, y, z)
     if kind == _INTERPOLATED:
-        fitted = fitted_values(params, x, y, z)
-        if fitted[0]:
-            return fitted[2], fitted[3], fitted[4]
         params = params[int(params[0]) :]
     return polyhedron_acceleration(params, x, y, z)
 
@@ -87,19 +81,6 @@ def acceleration_and_gradient(kind: int, params: Params, x: float, y: float, z: 
     if kind == _DIPOLE:
         return dipole_acceleration_and_gradient(params, x, y, z)
     if kind == _INTERPOLATED:
-        fitted = fitted_values(params, x, y, z)
-        if fitted[0]:
-            return (
-                fitted[2],
-                fitted[3],
-                fitted[4],
-                fitted[5],
-                fitted[6],
-                fitted[7],
-                fitted[8],
-                fitted[9],
-                fitted[10],
-            )
         params = params[int(params[0]) :]
     return polyhedron_acceleration_and_gradient(params, x, y, z)
 
