@@ -78,7 +78,7 @@ def no_cuts(size: int, intervals: int) -> CutBatch:
 
 
 @kernel
-def _keep_costates(case: ScaledCase, plan: Layout, solver: Solver, mass_costate: float, out: Floats) -> None:
+def keep_costates(case: ScaledCase, plan: Layout, solver: Solver, mass_costate: float, out: Floats) -> None:
     """Carry the multipliers back to the start and turn them into the rotating frame.
 
     With v_inertial = v + w x r the costates are lambda_v and lambda_r - w x lambda_v.
@@ -112,7 +112,7 @@ def _keep_costates(case: ScaledCase, plan: Layout, solver: Solver, mass_costate:
 
 
 @kernel
-def _keep_pressure(case: ScaledCase, plan: Layout, solver: Solver, out: Floats) -> None:
+def keep_pressure(case: ScaledCase, plan: Layout, solver: Solver, out: Floats) -> None:
     """What a relative loosening of each constraint takes off the objective (envelope theorem)."""
     point = solver.point
     arcs = case.arc_fractions.shape[0]
@@ -194,5 +194,5 @@ def solve_many(
             for a in range(3):
                 cuts.normal[i, c, a] = solver.cuts.normal[c, a]
         if outcome.status == CONVERGED:
-            _keep_costates(case, plan, solver, outcome.mass_costate, out.costates[i])
-            _keep_pressure(case, plan, solver, out.pressure[i])
+            keep_costates(case, plan, solver, outcome.mass_costate, out.costates[i])
+            keep_pressure(case, plan, solver, out.pressure[i])

@@ -22,7 +22,7 @@ from landing_cli.reach.certificate import GravityBounds, certified_thrust_level,
 from landing_cli.reach.delivery import deliver_many, new_deliveries
 from landing_cli.reach.descent_model import layout, refresh
 from landing_cli.reach.ellipsoid_arcs import arc_cuts_many, freeze_many, lowest_levels, lowest_levels_between
-from landing_cli.reach.free_batch import no_cuts, solve_many
+from landing_cli.reach.free_batch import keep_costates, keep_pressure, no_cuts, solve_many
 from landing_cli.reach.free_descent import PreparedCase, Surroundings, prepare, survey
 from landing_cli.reach.free_solve import Solver, cold_start, new_solver
 from landing_cli.reach.records import LandingCase
@@ -60,9 +60,10 @@ def compile_parts(case: LandingCase) -> None:
         build_surface_index(mesh), facet_centroids(mesh), facet_normals(mesh), mean_edge_m(mesh), unbound
     )
     prepared = prepare(case, shared)
-    parts = [_conic, _flight, _delivery, lambda _: survey(case), _ellipsoid_arcs]
+    # gravity comes with the survey: where two begin together, the other does not need it
+    parts = [_conic, lambda _: survey(case), _flight, _delivery, _certificates, _answers, _ellipsoid_arcs]
     if case.descent == "extremal":
-        parts.insert(0, _extremals)
+        parts.insert(2, _extremals)
     with np.errstate(all="ignore"):
         share_out([_bound(part, prepared) for part in parts], len(os.sched_getaffinity(0)))
 
@@ -76,17 +77,30 @@ def _solver(prepared: PreparedCase) -> Solver:
 
 
 def _conic(prepared: PreparedCase) -> None:
-    """Interior-point iterations and certificates."""
-    solver, case = _solver(prepared), prepared.coarse
+    """Interior-point iterations."""
+    solver = _solver(prepared)
     point, model, step = solver.point, solver.model, solver.step
-    rows, cones, target = model.row_value.shape[0], model.cone_offset.shape[0], np.ones(3)
-    plan = layout(case, 0, 1.0, False, 1.0)
+    rows, cones = model.row_value.shape[0], model.cone_offset.shape[0]
     advance(point, model, step, 6, rows, cones, 1.0, 1e-9, False)
     residuals(point, model, step, 6, rows, cones, False)
-    linearised_thrust_level(case, plan, point, model, solver.duals)
+
+
+def _certificates(prepared: PreparedCase) -> None:
+    """Bounds that prove a facet unreachable."""
+    solver, case, target = _solver(prepared), prepared.coarse, prepared.shared.normals[0]
+    point, model = solver.point, solver.model
+    linearised_thrust_level(case, layout(case, 0, 1.0, False, 1.0), point, model, solver.duals)
     certified_thrust_level(
         case, target, prepared.coarse_tube, 1.0, model, point.multiplier, point.cone_dual, solver.duals
     )
+
+
+def _answers(prepared: PreparedCase) -> None:
+    """What is kept of a solve's multipliers."""
+    solver, case = _solver(prepared), prepared.coarse
+    plan = layout(case, 0, 1.0, False, 1.0)
+    keep_costates(case, plan, solver, 0.0, np.zeros(7))
+    keep_pressure(case, plan, solver, np.zeros(6))
 
 
 def _flight(prepared: PreparedCase) -> None:
