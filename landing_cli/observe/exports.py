@@ -12,6 +12,7 @@ from landing_cli.observe.path_values import velocity_increments
 from landing_cli.observe.records import ObserveCase, Path
 from landing_cli.observe.stored import ObservationEntry, ObserveRun
 from landing_cli.observe.summary import summarise
+from landing_cli.results.oem import landing_oem
 from landing_cli.results.tables import (
     Table,
     TableColumn,
@@ -21,6 +22,8 @@ from landing_cli.results.tables import (
     to_json,
     trajectory_table,
 )
+
+export_oem = landing_oem
 
 TEXT_FORMATS: Mapping[str, Callable[[Table], str]] = {"csv": to_csv, "json": to_json}
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,8 +10,10 @@ from landing_cli.errors import InputRefused
 from landing_cli.flight.trajectory import Trajectory
 from landing_cli.plan.stored import PlanEntry, PlanRun
 from landing_cli.plan.summary import summarise
-from landing_cli.results.oem import to_oem
+from landing_cli.results.oem import landing_oem
 from landing_cli.results.tables import Table, summary_table, to_csv, to_json, trajectory_table
+
+export_oem = landing_oem
 
 TEXT_FORMATS: Mapping[str, Callable[[Table], str]] = {"csv": to_csv, "json": to_json}
 
@@ -107,29 +108,3 @@ def _flat(entry: PlanEntry) -> dict[str, object]:
         elif array.shape == (3,) and array.dtype.kind in "if":
             flat |= {f"{name}_{axis}": float(part) for axis, part in zip("xyz", array, strict=True)}
     return flat
-
-
-def export_oem(run: PlanRun, flown: Trajectory, scenario: Mapping[str, Any], created_utc: str) -> str:
-    """Write a flight as an OEM in the body-fixed frame.
-
-    Parameters
-    ----------
-    run : PlanRun
-        The run.
-    flown : Trajectory
-        The flight.
-    scenario : mapping
-        The stored scenario, whose body has the epoch.
-    created_utc : str
-        For the header, ISO 8601.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputRefused
-        If the scenario has no epoch.
-    """
-    return to_oem(flown, run.asteroid.name, "lander", scenario["body"].get("epoch_utc"), created_utc)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from landing_cli.reach.flown import flown_trajectory
 from landing_cli.reach.records import FACET_COLUMNS
 from landing_cli.reach.stored import CaseResult, ReachRun
 from landing_cli.results.maps import WRITERS, on_every_facet
-from landing_cli.results.oem import to_oem
+from landing_cli.results.oem import landing_oem
 from landing_cli.results.tables import (
     Table,
     TableColumn,
@@ -25,6 +24,8 @@ from landing_cli.results.tables import (
     trajectory_table,
 )
 from landing_cli.results.tree import table_group
+
+export_oem = landing_oem
 
 _BOUNDARY_PARTS = ("section", "ring", "expansion", "boundary", "domain")
 TEXT_FORMATS: Mapping[str, Callable[[Table], str]] = {"csv": to_csv, "json": to_json}
@@ -198,29 +199,3 @@ def export_map(run: ReachRun, form: str, case: str | None = None) -> bytes:
 def _rank(name: str, order: list[str]) -> int:
     """Rank of a flat column: that of the longest stored column that its name begins with."""
     return order.index(max((c for c in order if name == c or name.startswith(f"{c}_")), key=len))
-
-
-def export_oem(run: ReachRun, flown: Trajectory, scenario: Mapping[str, Any], created_utc: str) -> str:
-    """Write a flight as an OEM in the body-fixed frame.
-
-    Parameters
-    ----------
-    run : ReachRun
-        The run.
-    flown : Trajectory
-        The flight.
-    scenario : mapping
-        The stored scenario, whose body has the epoch.
-    created_utc : str
-        For the header, ISO 8601.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputRefused
-        If the scenario has no epoch.
-    """
-    return to_oem(flown, run.asteroid.name, "lander", scenario["body"].get("epoch_utc"), created_utc)

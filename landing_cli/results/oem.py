@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.asteroid import Asteroid
 from landing_cli.errors import InputRefused
 from landing_cli.flight.astronomy import OBLIQUITY_RAD
 from landing_cli.flight.trajectory import Trajectory
@@ -35,6 +37,40 @@ class HeliocentricArc:
     position_m: NDArray[np.float64]
     velocity_m_s: NDArray[np.float64]
     comment: str
+
+
+class _OverAsteroid(Protocol):
+    """A run of a landing mission."""
+
+    @property
+    def asteroid(self) -> Asteroid:
+        """The asteroid."""
+
+
+def landing_oem(run: _OverAsteroid, flown: Trajectory, scenario: Mapping[str, Any], created_utc: str) -> str:
+    """Write a flight of a landing mission as an OEM in the body-fixed frame.
+
+    Parameters
+    ----------
+    run : run of a landing mission
+        It knows the asteroid.
+    flown : Trajectory
+        The flight.
+    scenario : mapping
+        The stored scenario, whose body has the epoch.
+    created_utc : str
+        For the header, ISO 8601.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputRefused
+        If the scenario has no epoch.
+    """
+    return to_oem(flown, run.asteroid.name, "lander", scenario["body"].get("epoch_utc"), created_utc)
 
 
 def to_oem(
