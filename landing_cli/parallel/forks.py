@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
@@ -20,8 +21,9 @@ _TICK_S = 0.02
 def share_out(tasks: Sequence[Task], processes: int) -> None:
     """Run every task once, in this process or in a forked copy of it.
 
-    Copies see everything as it was at the fork; what they return or raise is lost. Where other threads
-    run, which a fork would not copy, this process does all the work.
+    Copies see everything as it was at the fork; what they return or raise is lost. Where other threads work,
+    which a fork would not copy, nor the locks they hold let go, this process does it all. Daemon threads may
+    wait beside it, as the watchdog of signals does.
 
     Parameters
     ----------
@@ -30,7 +32,7 @@ def share_out(tasks: Sequence[Task], processes: int) -> None:
     processes : int
         How many work, this one included.
     """
-    if threading.active_count() > 1 or not hasattr(os, "fork"):
+    if any(not thread.daemon for thread in threading.enumerate() if thread is not threading.current_thread()):
         processes = 1
     waiting, filled = os.pipe()
     os.write(filled, bytes(range(len(tasks))))
@@ -52,18 +54,22 @@ def share_out(tasks: Sequence[Task], processes: int) -> None:
 
 def _fork(tasks: Sequence[Task], waiting: int) -> int:
     parent = os.getpid()
-    # nobody is told of a signal before it is known whose it is
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    # no signal is handled before it is known whose it is
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
     try:
-        copy = os.fork()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of forks beside threads, from Python 3.12
+            copy = os.fork()
     except OSError:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         raise
     if copy == 0:
         code = 1
         try:
-            for number in (signal.SIGINT, signal.SIGTERM):
+            signal.set_wakeup_fd(-1)  # it leads to the parent's watchdog
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, signal.SIG_IGN)
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
             die_with(parent)
             nowhere = os.open(os.devnull, os.O_RDWR)
             for stream in (0, 1, 2):
