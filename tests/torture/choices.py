@@ -5,11 +5,13 @@ from __future__ import annotations
 import signal
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from hostile_disks import refused
 from programs import Ended, Reference, Tally, environment, finish
 
+from landing_cli.results.journal import NotAJournal, read_journal
 from landing_cli.results.output import journal_path
 
 
@@ -47,10 +49,20 @@ def _interrupt(command: list[str], output: Path) -> None:
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     process = subprocess.Popen(command, env=environment(), **quiet)
     journal = journal_path(output)
-    while process.poll() is None and not (journal.exists() and journal.stat().st_size > 20_000):
-        time.sleep(0.005)
+    while process.poll() is None and not _is_recorded(journal):
+        time.sleep(0.01)
     process.send_signal(signal.SIGKILL)
     process.wait()
+
+
+def _is_recorded(journal: Path) -> bool:
+    """Whether a whole record is there; it may be looked at while it is written."""
+    if not journal.exists():
+        return False
+    with suppress(NotAJournal):
+        content = read_journal(journal)
+        return content is not None and bool(content.records)
+    return False
 
 
 def _is_up_to_date(ended: Ended) -> list[str]:
