@@ -8,7 +8,8 @@ import os
 import sys
 from pathlib import Path
 
-from landing_cli.parallel.plan import WorkPlan, pin_blas_threads
+from landing_cli.parallel.blas import pin_blas_threads
+from landing_cli.parallel.plan import WorkPlan
 
 pin_blas_threads()
 

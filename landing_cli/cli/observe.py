@@ -91,7 +91,8 @@ def observe(
     Bends the energy-optimal landing towards the landmarks by waypoints, or, with --objective information,
     finds the path that knows best where it is. Writes runs/NAME-plan-observe.h5 unless -o says otherwise.
     """
-    from landing_cli.parallel.plan import WorkPlan, pin_blas_threads
+    from landing_cli.parallel.blas import pin_blas_threads
+    from landing_cli.parallel.plan import WorkPlan
 
     work = WorkPlan(
         jobs=len(os.sched_getaffinity(0)) if jobs is None else jobs,

@@ -267,7 +267,8 @@ def _carry_out(
     command: str, source: Source, way: _Way, tasks_of: Callable[[Request], Sequence[PlanTask]]
 ) -> None:
     """Read, build, solve, store, print, judge."""
-    from landing_cli.parallel.plan import WorkPlan, pin_blas_threads
+    from landing_cli.parallel.blas import pin_blas_threads
+    from landing_cli.parallel.plan import WorkPlan
 
     work = WorkPlan(
         jobs=len(os.sched_getaffinity(0)) if way.jobs is None else way.jobs,

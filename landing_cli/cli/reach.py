@@ -79,7 +79,8 @@ def run(
     Writes runs/NAME-reach-run.h5 unless -o says otherwise, and prints a table of the cases. The same
     scenario, shape and version again is up to date and not solved again.
     """
-    from landing_cli.parallel.plan import WorkPlan, pin_blas_threads
+    from landing_cli.parallel.blas import pin_blas_threads
+    from landing_cli.parallel.plan import WorkPlan
 
     plan = WorkPlan(
         jobs=len(os.sched_getaffinity(0)) if jobs is None else jobs,

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from landing_cli.tour.escape_records import EscapeRun
     from landing_cli.tour.pipeline import Outcome, RunOptions
     from landing_cli.tour.run_records import TourRun
-    from landing_cli.tour.verify import ChainReport
+    from landing_cli.tour.verify_records import ChainReport
 
 # what `landing results export` writes of a tour
 TABLES = ("summary", "flybys", "trajectory")
@@ -146,7 +146,8 @@ def escape(
     Eqs 1-2 of Liu et al. (2023), corrected; two orbits about the Earth are flown in N-body beside them.
     Draw the maps with `landing results plot`.
     """
-    from landing_cli.parallel.plan import WorkPlan, pin_blas_threads
+    from landing_cli.parallel.blas import pin_blas_threads
+    from landing_cli.parallel.plan import WorkPlan
 
     pin_blas_threads()
     from landing_cli.tour.escape_run import escape_request, run_escape
@@ -280,7 +281,8 @@ def _carry_out(
 ) -> None:
     """Read, search, fly, store, print, judge."""
     jobs, backend, scheduler, resume, force = way
-    from landing_cli.parallel.plan import WorkPlan, pin_blas_threads
+    from landing_cli.parallel.blas import pin_blas_threads
+    from landing_cli.parallel.plan import WorkPlan
 
     work = WorkPlan(
         jobs=len(os.sched_getaffinity(0)) if jobs is None else jobs,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeVar
@@ -14,8 +13,6 @@ C = TypeVar("C")
 R = TypeVar("R")
 
 BACKENDS = ("threads", "loky", "dask")
-BLAS_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS")
-BLAS_PINS = {f"{library}_NUM_THREADS": "1" for library in BLAS_LIBRARIES}
 
 
 @dataclass(frozen=True)
@@ -62,14 +59,6 @@ class WorkPlan:
                 where="--scheduler",
                 fix="add --backend dask",
             )
-
-
-def pin_blas_threads() -> None:
-    """Set the environment so that BLAS runs one thread in this process and its workers.
-
-    Call it before numpy is first imported; a second thread changes the order of sums.
-    """
-    os.environ.update(BLAS_PINS)
 
 
 def run_chunks(

@@ -17,8 +17,8 @@ from multiprocessing import Pipe
 from multiprocessing.connection import wait
 from typing import Any, Generic, TypeVar
 
+from landing_cli.parallel.blas import BLAS_PINS
 from landing_cli.parallel.chunks import Attempt, LostChunk
-from landing_cli.parallel.plan import BLAS_PINS
 from landing_cli.parallel.worker import serve
 
 C = TypeVar("C")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,8 @@ from landing_cli.tour.forces import EARTH_J2, EARTH_RADIUS_M
 from landing_cli.tour.records import Flyby, FlybyChain, Leg
 from landing_cli.tour.run_records import ChainEntry, TourFacts
 from landing_cli.tour.targets import diameter_m
+from landing_cli.tour.verify_escape import verify_map
+from landing_cli.tour.verify_records import ChainReport, Check
 
 FloatArray = NDArray[np.float64]
 
@@ -47,67 +48,6 @@ _GM = np.array([GM_M3_S2[name] for name in BODIES])
 _EARTH = BODIES.index("Earth")
 _COSINE, _SINE = math.cos(OBLIQUITY_RAD), math.sin(OBLIQUITY_RAD)
 _TO_ICRF = np.array([[1.0, 0.0, 0.0], [0.0, _COSINE, -_SINE], [0.0, _SINE, _COSINE]])
-
-
-@dataclass(frozen=True)
-class Check:
-    """One respect in which a flight was checked."""
-
-    value: float
-    limit: float
-
-    @property
-    def failing(self) -> bool:
-        """Whether it is beyond its limit; what is no number is."""
-        return not self.value <= self.limit
-
-
-@dataclass(frozen=True)
-class ChainReport:
-    """What the re-flight of a chain found.
-
-    Attributes
-    ----------
-    case : str
-        Name of the chain.
-    status : str
-        As stored.
-    flown : bool
-        Whether it claims to hold in N-body.
-    worst : mapping of str to Check
-        By what was checked, causes before effects.
-    fault : str
-        What cannot be true in the record; empty where nothing is.
-    """
-
-    case: str
-    status: str
-    flown: bool
-    worst: Mapping[str, Check]
-    fault: str
-
-    @property
-    def verified(self) -> bool:
-        """Whether everything is as the result says."""
-        return not self.fault and not any(check.failing for check in self.worst.values())
-
-    @property
-    def badness(self) -> float:
-        """How far the worst check is beyond its limit, as a multiple of it; infinite for a fault."""
-        if self.fault:
-            return math.inf
-        values = [c.value / c.limit if c.value == c.value else math.inf for c in self.worst.values()]
-        return max(values, default=0.0)
-
-    @property
-    def reason(self) -> str:
-        """What is wrong, causes before effects; empty where nothing is."""
-        if self.fault:
-            return f"{self.case}: {self.fault}"
-        for name, check in self.worst.items():
-            if check.failing:
-                return f"{self.case}: {name} {check.value:.3g}, at most {check.limit:g} is allowed"
-        return ""
 
 
 def verify_run(
@@ -139,8 +79,6 @@ def verify_run(
     if not entries:
         return ()
     if isinstance(entries[0], EscapeMap):
-        from landing_cli.tour.verify_escape import verify_map
-
         return tuple(verify_map(entry) for entry in entries)
     reports: list[ChainReport] = []
     with heliocentric_points(entries[0].facts.ephemeris) as points:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from landing_cli.tour.escape_records import EscapeMap
-from landing_cli.tour.verify import ChainReport, Check
+from landing_cli.tour.verify_records import ChainReport, Check
 
 LIMIT_M_S = 1e-6
 

@@ -23,7 +23,7 @@ def solve_items(prepared, facets, items):  # type: ignore[no-untyped-def]
 
 def command(arguments: Sequence[str]) -> int:
     """Run ``reach`` with the pipeline's solver replaced by the one above."""
-    from landing_cli.parallel.plan import pin_blas_threads
+    from landing_cli.parallel.blas import pin_blas_threads
 
     pin_blas_threads()  # as the command does before it imports the pipeline
     from landing_cli.reach import pipeline
