@@ -33,7 +33,7 @@ from landing_cli.errors import NothingFeasible, PartialResult, UsageError
 if TYPE_CHECKING:
     from landing_cli.observe.pipeline import Outcome, Request
     from landing_cli.observe.stored import ObservationEntry, ObserveRun
-    from landing_cli.observe.verify import ObserveReport
+    from landing_cli.results.verification import FieldReport
 
 # what `landing results export` writes of an observation
 TABLES = ("summary", "trajectory", "landmarks", "view")
@@ -151,12 +151,12 @@ def print_run(run: ObserveRun, path: Path, as_json: bool) -> None:
     console.print_table(columns, [list(row.values()) for row in rows], title=title)
 
 
-def print_verification(reports: Sequence[ObserveReport], path: Path, as_json: bool) -> None:
+def print_verification(reports: Sequence[FieldReport], path: Path, as_json: bool) -> None:
     """Print what the re-flight of paths found: a table, or JSON with every check.
 
     Parameters
     ----------
-    reports : sequence of ObserveReport
+    reports : sequence of FieldReport
         One a path.
     path : Path
         The run's file.

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from landing_cli.plan.pipeline import Outcome, Request
     from landing_cli.plan.stored import PlanRun
     from landing_cli.plan.tasks import PlanTask
-    from landing_cli.plan.verify import PlanReport
+    from landing_cli.results.verification import FieldReport
 
 # what `landing results export` writes of a plan
 TABLES = ("trajectory", "summary")
@@ -335,12 +335,12 @@ def print_run(run: PlanRun, path: Path, as_json: bool) -> None:
     console.print_table(_COLUMNS, rows, title=f"Plans: {run.asteroid.name}")
 
 
-def print_verification(reports: Sequence[PlanReport], path: Path, as_json: bool) -> None:
+def print_verification(reports: Sequence[FieldReport], path: Path, as_json: bool) -> None:
     """Print what the re-flight of plans found: a table, or JSON with every check.
 
     Parameters
     ----------
-    reports : sequence of PlanReport
+    reports : sequence of FieldReport
         One a plan.
     path : Path
         The run's file.

@@ -121,7 +121,7 @@ def export(
     run: ResultFile,
     table: Annotated[
         ExportedTable | None,
-        typer.Option(help="What; facets unless given (of a plan: trajectory; else: summary)."),
+        typer.Option(help="Of a reach run facets unless given, of a plan trajectory, else summary."),
     ] = None,
     case: CaseName = None,
     facet: Facet = None,

@@ -32,12 +32,12 @@ from landing_cli.cli.options import (
 from landing_cli.errors import NothingFeasible, PartialResult, UsageError
 
 if TYPE_CHECKING:
+    from landing_cli.results.verification import Report
     from landing_cli.scenario.load import LoadedTour
     from landing_cli.tour.cases import TourCase
     from landing_cli.tour.escape_records import EscapeRun
     from landing_cli.tour.pipeline import Outcome, RunOptions
     from landing_cli.tour.run_records import TourRun
-    from landing_cli.tour.verify_records import ChainReport
 
 # what `landing results export` writes of a tour
 TABLES = ("summary", "flybys", "trajectory")
@@ -229,12 +229,12 @@ def print_run(run: TourRun | EscapeRun, path: Path, as_json: bool) -> None:
         _print_search(run, path, as_json)
 
 
-def print_verification(reports: Sequence[ChainReport], path: Path, as_json: bool) -> None:
+def print_verification(reports: Sequence[Report], path: Path, as_json: bool) -> None:
     """Print what the re-flight of chains found: a table, or JSON with every check.
 
     Parameters
     ----------
-    reports : sequence of ChainReport
+    reports : sequence of Report
         One a chain.
     path : Path
         The run's file.

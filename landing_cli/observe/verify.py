@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -26,6 +25,7 @@ from landing_cli.observe.records import ObserveCase, ObservedPath, Path, Waypoin
 from landing_cli.observe.stored import ObservationEntry
 from landing_cli.observe.tasks import observed
 from landing_cli.parallel import LostChunk, WorkPlan, run_chunks
+from landing_cli.results.verification import Check, FieldReport
 
 FloatArray = NDArray[np.float64]
 
@@ -51,76 +51,13 @@ LIMITS: Mapping[str, float] = {
 }
 
 
-@dataclass(frozen=True)
-class Check:
-    """One respect in which a flight was checked."""
-
-    value: float
-    limit: float
-
-    @property
-    def failing(self) -> bool:
-        """Whether it is beyond its limit; what is no number is."""
-        return not self.value <= self.limit
-
-
-@dataclass(frozen=True)
-class ObserveReport:
-    """What the re-flight of a path found.
-
-    Attributes
-    ----------
-    case : str
-        Name of the observation, or ``nominal``.
-    status : str
-        As stored.
-    flown : bool
-    worst : mapping of str to Check
-        By what was checked, causes before effects.
-    fault : str
-        What cannot be true in the record; empty where nothing is.
-    polyhedron_miss_m : float or None
-        Miss of the same control under the polyhedron; None where it was not flown.
-    """
-
-    case: str
-    status: str
-    flown: bool
-    worst: Mapping[str, Check]
-    fault: str
-    polyhedron_miss_m: float | None
-
-    @property
-    def verified(self) -> bool:
-        """Whether everything is as the result says."""
-        return not self.fault and not any(check.failing for check in self.worst.values())
-
-    @property
-    def badness(self) -> float:
-        """How far the worst check is beyond its limit, as a multiple of it; infinite for a fault."""
-        if self.fault:
-            return math.inf
-        values = [c.value / c.limit if c.value == c.value else math.inf for c in self.worst.values()]
-        return max(values, default=0.0)
-
-    @property
-    def reason(self) -> str:
-        """What is wrong, causes before effects; empty where nothing is."""
-        if self.fault:
-            return f"{self.case}: {self.fault}"
-        for name, check in self.worst.items():
-            if check.failing:
-                return f"{self.case}: {name} {check.value:.3g}, at most {check.limit:g} is allowed"
-        return ""
-
-
 def verify_run(
     entries: tuple[ObservationEntry, ...],
     *,
     polyhedron_for_all: bool = False,
     jobs: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> tuple[ObserveReport, ...]:
+) -> tuple[FieldReport, ...]:
     """Fly the unsteered path and every steered one again, and check what is said about them.
 
     Parameters
@@ -136,7 +73,7 @@ def verify_run(
 
     Returns
     -------
-    tuple of ObserveReport
+    tuple of FieldReport
         The unsteered path's first, then one an observation.
     """
     case = entries[0].case
@@ -148,7 +85,7 @@ def verify_run(
         (NOMINAL, entries[0].observation.nominal, None)
     ]
     paths += [(entry.name, entry.observation.steered, entry.observation.waypoints) for entry in entries]
-    reports: dict[int, ObserveReport] = {}
+    reports: dict[int, FieldReport] = {}
     chunks = [[index] for index in range(len(paths))]
     with closing(
         run_chunks(partial(_verify_at, case, paths, polyhedron), chunks, WorkPlan(jobs=jobs))
@@ -165,7 +102,7 @@ def _verify_at(
     paths: list[tuple[str, ObservedPath, Waypoints | None]],
     polyhedron: GravityField | None,
     chunk: list[int],
-) -> ObserveReport:
+) -> FieldReport:
     return verify_path(case, *paths[chunk[0]], polyhedron)
 
 
@@ -175,7 +112,7 @@ def verify_path(
     stored: ObservedPath,
     waypoints: Waypoints | None = None,
     polyhedron: GravityField | None = None,
-) -> ObserveReport:
+) -> FieldReport:
     """Fly one path again and check what is said about it.
 
     Parameters
@@ -193,14 +130,14 @@ def verify_path(
 
     Returns
     -------
-    ObserveReport
+    FieldReport
     """
     path = stored.path
     fault = "" if path.status == "planned" or path.message else f"it is {path.status}, but does not say why"
     if not fault and case.time_of_flight == "fixed" and abs(path.tof_s - case.tof_s) > 1e-9 * case.tof_s:
         fault = f"it lasts {path.tof_s:.9g} s, its time of flight is {case.tof_s:.9g} s"
     if fault or path.status == "unresolved":
-        return ObserveReport(name, path.status, False, {}, fault, None)
+        return FieldReport(name, path.status, False, {}, fault, None)
     again = observed(case, fly(case, path, case.asteroid.gravity))
     checks = _agreement(stored, again)
     if path.status == "planned":
@@ -209,7 +146,7 @@ def verify_path(
     miss = None
     if polyhedron is not None:
         miss = math.dist(fly(case, path, polyhedron).position_m[-1], case.frame.origin_m)
-    return ObserveReport(name, path.status, True, worst, "", miss)
+    return FieldReport(name, path.status, True, worst, "", miss)
 
 
 def fly(case: ObserveCase, path: Path, field: GravityField) -> Path:

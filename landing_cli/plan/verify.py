@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
@@ -24,6 +23,7 @@ from landing_cli.parallel import LostChunk, WorkPlan, run_chunks
 from landing_cli.plan.assess import Measured, accelerations_at, at_times, measure_trajectory
 from landing_cli.plan.records import CHECK_SAMPLES, Plan, PlanCase
 from landing_cli.plan.stored import PlanEntry
+from landing_cli.results.verification import Check, FieldReport
 
 POLYHEDRON_PLANS = 20
 """Plans that fly under the polyhedron unless all do: a flight takes seconds on a large mesh."""
@@ -44,77 +44,13 @@ LIMITS: Mapping[str, float] = {
 }
 
 
-@dataclass(frozen=True)
-class Check:
-    """One respect in which a flight was checked."""
-
-    value: float
-    limit: float
-
-    @property
-    def failing(self) -> bool:
-        """Whether it is beyond its limit; what is no number is."""
-        return not self.value <= self.limit
-
-
-@dataclass(frozen=True)
-class PlanReport:
-    """What the re-flight of a plan found.
-
-    Attributes
-    ----------
-    case : str
-        Name of the plan.
-    status : str
-        As stored.
-    flown : bool
-        Whether it has a control and claims to be planned.
-    worst : mapping of str to Check
-        By what was checked, causes before effects.
-    fault : str
-        What cannot be true in the record; empty where nothing is.
-    polyhedron_miss_m : float or None
-        Miss of the same control under the polyhedron; None where it was not flown.
-    """
-
-    case: str
-    status: str
-    flown: bool
-    worst: Mapping[str, Check]
-    fault: str
-    polyhedron_miss_m: float | None
-
-    @property
-    def verified(self) -> bool:
-        """Whether everything is as the result says."""
-        return not self.fault and not any(check.failing for check in self.worst.values())
-
-    @property
-    def badness(self) -> float:
-        """How far the worst check is beyond its limit, as a multiple of it; infinite for a fault."""
-        if self.fault:
-            return math.inf
-        values = [c.value / c.limit if c.value == c.value else math.inf for c in self.worst.values()]
-        return max(values, default=0.0)
-
-    @property
-    def reason(self) -> str:
-        """What is wrong, causes before effects; empty where nothing is."""
-        if self.fault:
-            return f"{self.case}: {self.fault}"
-        for name, check in self.worst.items():
-            if check.failing:
-                return f"{self.case}: {name} {check.value:.3g}, at most {check.limit:g} is allowed"
-        return ""
-
-
 def verify_run(
     entries: tuple[PlanEntry, ...],
     *,
     polyhedron_for_all: bool = False,
     jobs: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> tuple[PlanReport, ...]:
+) -> tuple[FieldReport, ...]:
     """Fly every plan again and check what is said about it.
 
     Parameters
@@ -130,7 +66,7 @@ def verify_run(
 
     Returns
     -------
-    tuple of PlanReport
+    tuple of FieldReport
         One a plan.
     """
     asteroid = entries[0].case.asteroid
@@ -142,7 +78,7 @@ def verify_run(
             np.linspace(0, count - 1, min(count, POLYHEDRON_PLANS)).round().astype(int)
         ).tolist()
     work = partial(_verify_at, entries, polyhedron, frozenset(sample))
-    reports: dict[int, PlanReport] = {}
+    reports: dict[int, FieldReport] = {}
     with closing(run_chunks(work, [[index] for index in range(count)], WorkPlan(jobs=jobs))) as coming:
         for index, report in coming:
             assert not isinstance(report, LostChunk)  # threads lose nothing
@@ -153,7 +89,7 @@ def verify_run(
 
 def _verify_at(
     entries: tuple[PlanEntry, ...], polyhedron: GravityField, sample: frozenset[int], chunk: list[int]
-) -> PlanReport:
+) -> FieldReport:
     index = chunk[0]
     return verify_entry(entries[index], polyhedron if index in sample else None)
 
@@ -162,7 +98,7 @@ def verify_entry(
     entry: PlanEntry,
     polyhedron: GravityField | None = None,
     integrator: Literal["dop853", "gauss"] = "dop853",
-) -> PlanReport:
+) -> FieldReport:
     """Fly one plan again and check what is said about it.
 
     Parameters
@@ -176,18 +112,18 @@ def verify_entry(
 
     Returns
     -------
-    PlanReport
+    FieldReport
     """
     case, plan = entry.case, entry.plan
     fault = fault_of(entry)
     if fault or plan.status != "planned":
-        return PlanReport(entry.name, plan.status, False, {}, fault, None)
+        return FieldReport(entry.name, plan.status, False, {}, fault, None)
     flown = measure_trajectory(case, *fly(case, plan, integrator))
     miss = None
     if polyhedron is not None and case.asteroid.gravity.kind is not GravityKind.POLYHEDRON:
         end = _flight(case, plan, polyhedron, "gauss").position_m[-1]
         miss = math.dist(end, case.site.position_m)
-    return PlanReport(entry.name, plan.status, True, _checks(entry, flown), "", miss)
+    return FieldReport(entry.name, plan.status, True, _checks(entry, flown), "", miss)
 
 
 def fault_of(entry: PlanEntry) -> str:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from landing_cli.flight.astronomy import GM_SUN_M3_S2, OBLIQUITY_RAD
 from landing_cli.flight.elements import states_of
+from landing_cli.results.verification import Check, Report
 from landing_cli.sources.ephemeris_points import BODIES, Points, heliocentric_points
 from landing_cli.tour.ephemeris import GM_M3_S2
 from landing_cli.tour.escape_records import EscapeMap
@@ -24,7 +25,6 @@ from landing_cli.tour.records import Flyby, FlybyChain, Leg
 from landing_cli.tour.run_records import ChainEntry, TourFacts
 from landing_cli.tour.targets import diameter_m
 from landing_cli.tour.verify_escape import verify_map
-from landing_cli.tour.verify_records import ChainReport, Check
 
 FloatArray = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def verify_run(
     polyhedron_for_all: bool = False,
     jobs: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> tuple[ChainReport, ...]:
+) -> tuple[Report, ...]:
     """Fly every chain again and check what is said about it; of an escape run, evaluate its maps anew.
 
     Parameters
@@ -72,7 +72,7 @@ def verify_run(
 
     Returns
     -------
-    tuple of ChainReport
+    tuple of Report
         One a chain.
     """
     del polyhedron_for_all, jobs
@@ -80,7 +80,7 @@ def verify_run(
         return ()
     if isinstance(entries[0], EscapeMap):
         return tuple(verify_map(entry) for entry in entries)
-    reports: list[ChainReport] = []
+    reports: list[Report] = []
     with heliocentric_points(entries[0].facts.ephemeris) as points:
         asteroids = _asteroid_states(entries, points)
         for entry in entries:
@@ -91,7 +91,7 @@ def verify_run(
 
 def verify_entry(
     entry: ChainEntry, asteroids: Mapping[tuple[int, float], FloatArray], points: Points
-) -> ChainReport:
+) -> Report:
     """Fly one chain again and check what is said about it.
 
     Parameters
@@ -105,16 +105,16 @@ def verify_entry(
 
     Returns
     -------
-    ChainReport
+    Report
     """
     chain = entry.chain
     fault = fault_of(entry)
     if fault or chain.nbody_legs is None or chain.status != "flown":
-        return ChainReport(entry.name, chain.status, False, {}, fault)
+        return Report(entry.name, chain.status, False, {}, fault)
     try:
         states, path_m = _flown_again(entry, chain.nbody_legs, points)
     except ArithmeticError as error:
-        return ChainReport(entry.name, chain.status, True, {}, str(error))
+        return Report(entry.name, chain.status, True, {}, str(error))
     there = np.array([asteroids[leg.target, leg.arrival_t_s] for leg in chain.nbody_legs])
     earth = np.array([points(leg.arrival_t_s)[_EARTH] for leg in chain.nbody_legs])
     distances = np.linalg.norm(there[:, :3] - earth, axis=1)
@@ -133,7 +133,7 @@ def verify_entry(
     if entry.facts.kind != "search":
         values = {name: value for name, value in values.items() if name not in SEARCH_ONLY}
     worst = {name: Check(value, LIMITS[name]) for name, value in values.items()}
-    return ChainReport(entry.name, chain.status, True, worst, "")
+    return Report(entry.name, chain.status, True, worst, "")
 
 
 def fault_of(entry: ChainEntry) -> str:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from landing_cli.results.verification import Check, Report
 from landing_cli.tour.escape_records import EscapeMap
-from landing_cli.tour.verify_records import ChainReport, Check
 
 LIMIT_M_S = 1e-6
 
 
-def verify_map(entry: EscapeMap) -> ChainReport:
+def verify_map(entry: EscapeMap) -> Report:
     """Check a map: after the burn the energy about the body is zero.
 
     Parameters
@@ -20,7 +20,7 @@ def verify_map(entry: EscapeMap) -> ChainReport:
 
     Returns
     -------
-    ChainReport
+    Report
     """
     low = entry.radius_m + entry.periapsis_altitude_m[:, None]
     high = entry.radius_m + entry.apoapsis_altitude_m[None]
@@ -32,4 +32,4 @@ def verify_map(entry: EscapeMap) -> ChainReport:
         fault = "has values where the apoapsis is below the periapsis, or none where it is above"
     excess = np.abs(energy / np.sqrt(2.0 * entry.gm_m3_s2 / low))  # as a velocity
     worst = {"energy_m_s": Check(float(np.nanmax(excess)), LIMIT_M_S)}
-    return ChainReport(entry.name, "map", True, worst, fault)
+    return Report(entry.name, "map", True, worst, fault)

@@ -1,4 +1,4 @@
-"""What a verification found."""
+"""What a verification found: every mission flies its stored paths again and reports in this way."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ class Check:
 
 
 @dataclass(frozen=True)
-class ChainReport:
-    """What the re-flight of a chain found.
+class Report:
+    """What the re-flight of a stored path found.
 
     Attributes
     ----------
     case : str
-        Name of the chain.
+        Name of the plan, observation or chain.
     status : str
         As stored.
     flown : bool
-        Whether it claims to hold in N-body.
+        Whether it claims to be flown: a chain that broke, say, does not.
     worst : mapping of str to Check
         By what was checked, causes before effects.
     fault : str
@@ -66,3 +66,16 @@ class ChainReport:
             if check.failing:
                 return f"{self.case}: {name} {check.value:.3g}, at most {check.limit:g} is allowed"
         return ""
+
+
+@dataclass(frozen=True)
+class FieldReport(Report):
+    """Of a landing: what another gravity field would have done to it.
+
+    Attributes
+    ----------
+    polyhedron_miss_m : float or None
+        Miss of the same control under the polyhedron; None where it was not flown.
+    """
+
+    polyhedron_miss_m: float | None
