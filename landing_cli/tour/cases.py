@@ -111,9 +111,11 @@ def tour_case(loaded: LoadedTour) -> TourCase:
     targets = select(catalogue, target_limits(tour.targets))
     refuse_far_epochs(targets, start_t_s, limits.end_t_s)
     epochs = targets.elements.epoch_t_s
-    ephemeris = flight_ephemeris(
-        tour.ephemeris, min(start_t_s, float(epochs.min())), max(limits.end_t_s, float(epochs.max()))
-    )
+    first_t_s, last_t_s = min(start_t_s, float(epochs.min())), max(limits.end_t_s, float(epochs.max()))
+    try:
+        ephemeris = flight_ephemeris(tour.ephemeris, first_t_s, last_t_s)
+    except InputRefused as error:
+        raise InputRefused(error.what, where=f"tour.ephemeris: {error.where}", fix=error.fix) from error
     return TourCase(
         loaded.scenario.name,
         catalogue,

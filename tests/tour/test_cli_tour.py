@@ -191,3 +191,8 @@ def test_fetch_downloads_checks_and_names_the_file(
     assert "no catalogue 'mars' is known" in told(capsys, "fetch", "mars", code=ExitCode.USAGE)[1]
     # and the search finds it by its bare name
     assert "9" in told(capsys, "search", "probe", "--catalogue", "list.csv", "--dry-run", "-q")[0]
+
+
+def test_a_missing_ephemeris_is_told_by_its_key(capsys: pytest.CaptureFixture[str]) -> None:
+    _, err = told(capsys, "search", "ce5.yaml", "--quiet", "--set", "tour.ephemeris=DE999", code=3)
+    assert err.startswith("error: tour.ephemeris: DE999: cannot be read (No such file or directory); name")
