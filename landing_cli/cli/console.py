@@ -8,6 +8,8 @@ import sys
 import time
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -52,6 +54,21 @@ def print_json(value: Any) -> None:
         Numpy scalars and arrays are accepted.
     """
     print_text(json.dumps(_jsonable(value), indent=2, allow_nan=False, ensure_ascii=False))
+
+
+def print_reports_json(reports: Sequence[Any], path: Path) -> None:
+    """Print what a verification found as JSON, with every check.
+
+    Parameters
+    ----------
+    reports : sequence of dataclasses
+        One a case; each tells whether it is ``verified``.
+    path : Path
+        The run's file.
+    """
+    cases = [{**asdict(report), "verified": report.verified} for report in reports]
+    verified = all(report.verified for report in reports)
+    print_json({"run": str(path), "verified": verified, "cases": cases})
 
 
 def print_text(text: str) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -164,9 +163,7 @@ def print_verification(reports: Sequence[FieldReport], path: Path, as_json: bool
         Print JSON.
     """
     if as_json:
-        paths = [{**asdict(report), "verified": report.verified} for report in reports]
-        verified = all(report.verified for report in reports)
-        console.print_json({"run": str(path), "verified": verified, "cases": paths})
+        console.print_reports_json(reports, path)
         return
     names = ("touchdown_miss_m", "touchdown_speed_m_s", "waypoint_miss_m", "stored_path_m", "stored_visible")
     rows = [

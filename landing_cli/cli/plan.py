@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
@@ -348,9 +348,7 @@ def print_verification(reports: Sequence[FieldReport], path: Path, as_json: bool
         Print JSON.
     """
     if as_json:
-        plans = [{**asdict(report), "verified": report.verified} for report in reports]
-        verified = all(report.verified for report in reports)
-        console.print_json({"run": str(path), "verified": verified, "cases": plans})
+        console.print_reports_json(reports, path)
         return
     names = (
         "touchdown_miss_m",

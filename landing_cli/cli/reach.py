@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -202,9 +201,7 @@ def print_verification(reports: Sequence[CaseReport], path: Path, as_json: bool)
         Print JSON.
     """
     if as_json:
-        cases = [{**asdict(report), "verified": report.verified} for report in reports]
-        verified = all(report.verified for report in reports)
-        console.print_json({"run": str(path), "verified": verified, "cases": cases})
+        console.print_reports_json(reports, path)
         return
     console.print_table(
         _VERIFICATION, [_verification_row(report) for report in reports], title="Verification"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -242,9 +241,7 @@ def print_verification(reports: Sequence[Report], path: Path, as_json: bool) -> 
         Print JSON.
     """
     if as_json:
-        cases = [{**asdict(report), "verified": report.verified} for report in reports]
-        verified = all(report.verified for report in reports)
-        console.print_json({"run": str(path), "verified": verified, "cases": cases})
+        console.print_reports_json(reports, path)
         return
     names = list(dict.fromkeys(name for report in reports for name in report.worst))
     rows = [
