@@ -201,10 +201,11 @@ def test_the_yaml_shows_every_key_of_the_section(folder: Path) -> None:
 
 @pytest.mark.parametrize("name", ["eros", "published/shen2026-eros"])
 def test_the_shipped_scenarios_have_landmarks_in_three_clusters(
-    project_root: Path, reference_shapes: Path, name: str
+    project_root: Path, reference_data: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     from landing_cli.observe.pipeline import ground_of, request_of
 
+    monkeypatch.setenv("LANDING_REFERENCE_DATA", str(reference_data))
     ground = ground_of(request_of(load(str(project_root / "configs" / f"{name}.yaml"))))
     assert ground.nominal.path.status == "planned"
     assert len(ground.clustering.center_m) == 3 and ground.clustering.chosen_by == "elbow"

@@ -12,6 +12,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from choices import choices
@@ -55,10 +56,11 @@ def _flips(reference: Reference, folder: Path, arguments: argparse.Namespace) ->
     shutil.copy(reference.result, copy)
     output = folder / "partial" / "run.h5"
     finish_deadly(reference, output)
-    return [
-        flip_bits("result", copy, arguments.flips),
-        flip_bits("journal", output.with_name("run.h5.journal"), arguments.flips // 4),
-    ]
+    journal = output.with_name("run.h5.journal")
+    with ThreadPoolExecutor() as pool:  # each in a process of its own
+        result_flips = pool.submit(flip_bits, "result", copy, arguments.flips)
+        journal_flips = pool.submit(flip_bits, "journal", journal, arguments.flips // 4)
+        return [result_flips.result(), journal_flips.result()]
 
 
 def _inputs(reference: Reference, folder: Path, arguments: argparse.Namespace) -> list[Tally]:

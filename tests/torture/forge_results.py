@@ -1,6 +1,7 @@
 """Results forged with a valid seal, each with one impossible value: refused, or read without harm.
 
-``python forge_results.py GOOD.h5 EVERY`` forges every EVERY-th possibility and prints what went wrong.
+``python forge_results.py GOOD.h5 EVERY SHARE/SHARES`` forges every EVERY-th possibility that falls to this
+share and prints what went wrong.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -53,14 +55,19 @@ def forge_results(folder: Path, every: int = 1) -> Tally:
     if ended.code:
         tally.record("the good file", [f"exit code {ended.code}: {ended.stderr[-300:]}"])
         return tally
-    command = [sys.executable, __file__, str(good), str(every)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment())
-    if done.returncode:
-        tally.record("the forger", [f"ended with {done.returncode}: {done.stderr[-300:]}"])
-        return tally
-    for line in done.stdout.splitlines():
-        tally.record(*json.loads(line))
+    shares = os.cpu_count() or 1
+    commands = [[sys.executable, __file__, str(good), str(every), f"{n}/{shares}"] for n in range(shares)]
+    with ThreadPoolExecutor(shares) as pool:
+        for done in pool.map(_forger, commands):
+            if done.returncode:
+                tally.record("the forger", [f"ended with {done.returncode}: {done.stderr[-300:]}"])
+            for line in done.stdout.splitlines():
+                tally.record(*json.loads(line))
     return tally
+
+
+def _forger(command: list[str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=environment())
 
 
 def forgeries(group: Group, path: tuple[str, ...] = ()) -> Iterator[tuple[str, Group]]:
@@ -147,7 +154,7 @@ def _arguments(command: tuple[str, ...], path: Path, good: Path) -> list[str]:
     return ["results", command[0], str(path), *(w.format(case=case, good=good) for w in command[1:])]
 
 
-def main(good: Path, every: int) -> None:
+def main(good: Path, every: int, share: int = 0, shares: int = 1) -> None:
     tree = read(good).tree
     _warm(good)
     if wrong := _complaints(good, good):
@@ -155,7 +162,7 @@ def main(good: Path, every: int) -> None:
     with tempfile.TemporaryDirectory(prefix="forged-") as folder:
         path = Path(folder) / "forged.h5"
         for number, (told, forged) in enumerate(forgeries(tree)):
-            if number % every == 0 and _write_forged(path, forged):
+            if number % (every * shares) == every * share and _write_forged(path, forged):
                 print(json.dumps([told, _complaints(path, good)]), flush=True)
 
 
@@ -172,4 +179,4 @@ def _warm(good: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]))
+    main(Path(sys.argv[1]), int(sys.argv[2]), *map(int, sys.argv[3].split("/")))
