@@ -38,7 +38,8 @@ ROOMS: dict[str, set[str]] = {
     "plan": RECORDS,
     "observe": RECORDS,
     "tour": RECORDS,
-    "cli": {"reach", "plan", "observe", "tour", *RECORDS},
+    "studies": {"reach", *RECORDS},
+    "cli": {"reach", "plan", "observe", "tour", "studies", *RECORDS},
 }
 # library -> the only place that knows it
 LIBRARIES = {

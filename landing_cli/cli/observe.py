@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from landing_cli.observe.stored import ObservationEntry, ObserveRun
     from landing_cli.results.verification import FieldReport
 
+# where `landing results` finds stored, exports, figures and verify
+PACKAGE = "landing_cli.observe"
 # what `landing results export` writes of an observation
 TABLES = ("summary", "trajectory", "landmarks", "view")
 HAS_FACETS = False

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from landing_cli.plan.tasks import PlanTask
     from landing_cli.results.verification import FieldReport
 
+# where `landing results` finds stored, exports, figures and verify
+PACKAGE = "landing_cli.plan"
 # what `landing results export` writes of a plan
 TABLES = ("trajectory", "summary")
 HAS_FACETS = False

@@ -49,6 +49,8 @@ _VERIFICATION = (
     "verdict",
 )
 
+# where `landing results` finds stored, exports, figures and verify
+PACKAGE = "landing_cli.reach"
 # what `landing results export` writes of a run
 TABLES = ("facets", "boundary", "trajectory", "summary")
 HAS_FACETS = True

@@ -301,7 +301,7 @@ def _read(path: Path) -> StoredResult:
 
 def _module(result: StoredResult, name: str) -> Any:
     """Find the mission's own part of a command."""
-    return importlib.import_module(f"landing_cli.{result.mission}.{name}")
+    return importlib.import_module(f"{MISSIONS[result.mission].PACKAGE}.{name}")
 
 
 def _run_of(result: StoredResult) -> Any:

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from landing_cli.tour.pipeline import Outcome, RunOptions
     from landing_cli.tour.run_records import TourRun
 
+# where `landing results` finds stored, exports, figures and verify
+PACKAGE = "landing_cli.tour"
 # what `landing results export` writes of a tour
 TABLES = ("summary", "flybys", "trajectory")
 HAS_FACETS = False
