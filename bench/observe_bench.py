@@ -29,9 +29,9 @@ from landing_cli.flight.replay import replay
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.observe.energy_flight import EnergyFlight, energy_flight, inverse_dynamics, spline_positions
 from landing_cli.observe.gravity_box import box_of
+from landing_cli.observe.observed import Path as FlownPath
 from landing_cli.observe.path_values import control_energy
 from landing_cli.observe.records import Landmarks, ObserveCase, Prior, Sensor, SteeringOptions
-from landing_cli.observe.records import Path as FlownPath
 from landing_cli.observe.site_frame import site_frame
 from landing_cli.observe.transcription import least_energy_path
 from landing_cli.observe.waypoints import waypoints_of

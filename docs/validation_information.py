@@ -11,9 +11,9 @@ import numpy as np
 from validation_text import spread, table
 
 from landing_cli.observe.features import ThomasField, thomas_landmarks
+from landing_cli.observe.observed import ObservedPath
 from landing_cli.observe.pareto import EqualEnergy, compare_at_equal_energy
 from landing_cli.observe.pipeline import ground_of, request_of
-from landing_cli.observe.records import ObservedPath
 from landing_cli.observe.tasks import Ground
 from landing_cli.scenario.load import load
 

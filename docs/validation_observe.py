@@ -13,8 +13,9 @@ from validation_information import information_study
 from validation_text import exact, table
 
 from landing_cli.errors import InputRefused
+from landing_cli.observe.observed import ObservedPath
 from landing_cli.observe.pipeline import ground_of, request_of
-from landing_cli.observe.records import ObservedPath, Side, SteeringOptions
+from landing_cli.observe.records import Side, SteeringOptions
 from landing_cli.observe.stored import ObservationEntry
 from landing_cli.observe.tasks import Ground, ObserveTask, solve_task
 from landing_cli.observe.verify import verify_path

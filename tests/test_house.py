@@ -43,7 +43,7 @@ ROOMS: dict[str, set[str]] = {
 }
 # library -> the only place that knows it
 LIBRARIES = {
-    "yaml": "scenario/load.py",
+    "yaml": "scenario/document.py",
     "pydantic": "scenario/",
     "h5py": "results/",
     "joblib": "parallel/",

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from scenario_samples import MINIMAL, SHIPPED, write_minimal
 
 from landing_cli.errors import InputRefused, LandingError, UsageError
-from landing_cli.scenario.load import MAX_DEPTH, load, parse, parse_scalar
+from landing_cli.scenario.document import MAX_DEPTH, parse, parse_scalar
+from landing_cli.scenario.load import load
 
 LEVELS = 100_000
 

@@ -10,7 +10,8 @@ import pytest
 from scenario_samples import MINIMAL, SHIPPED, write_minimal
 
 from landing_cli.errors import InputRefused
-from landing_cli.scenario.load import load, load_any, parse
+from landing_cli.scenario.document import parse
+from landing_cli.scenario.load import load, load_any
 from landing_cli.scenario.schema import (
     Scenario,
     from_tree,

@@ -147,7 +147,8 @@ def _request_of_run(command: str, source: Source, overrides: Sequence[str], voic
     from landing_cli.reach.stored import run_from_result
     from landing_cli.results.store import read
     from landing_cli.scenario.build import build_spacecraft
-    from landing_cli.scenario.load import Document, load_document, parse
+    from landing_cli.scenario.document import Document, parse
+    from landing_cli.scenario.load import load_document
 
     assert source.from_run is not None
     result = read(source.from_run)

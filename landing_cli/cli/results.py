@@ -279,7 +279,7 @@ def _exported(
         return str(exports.export_table(run, table.value, form.value, case, flown)).encode()
     from datetime import UTC, datetime
 
-    from landing_cli.scenario.load import parse
+    from landing_cli.scenario.document import parse
 
     scenario = parse(result.identity.scenario, "the stored scenario").tree
     created = datetime.now(UTC).isoformat()

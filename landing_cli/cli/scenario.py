@@ -123,7 +123,7 @@ def _landing_facts(loaded: LoadedScenario) -> dict[str, object]:
 
 
 def _tour_facts(loaded: LoadedTour) -> dict[str, object]:
-    from landing_cli.cli.tour import case_facts
+    from landing_cli.cli.tour_tables import case_facts
     from landing_cli.tour.cases import tour_case
 
     return case_facts(tour_case(loaded))

@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -28,6 +28,13 @@ from landing_cli.cli.options import (
     _complete_scenario,
     new_program,
 )
+from landing_cli.cli.tour_tables import (
+    case_facts,
+    print_comparison,
+    print_escape,
+    print_facts,
+    print_search,
+)
 from landing_cli.errors import NothingFeasible, PartialResult, UsageError
 
 if TYPE_CHECKING:
@@ -46,19 +53,6 @@ HAS_FACETS = False
 
 app = new_program("Which asteroids a spare spacecraft can fly by on its way.")
 
-_SHOWN = 20
-_CHAIN_COLUMNS = ("name", "asteroids", "nbody_delta_v_m_s", "delta_v_m_s", "duration_d", "front", "targets")
-_FLYBY_COLUMNS = (
-    "designation",
-    "date_utc",
-    "nbody_delta_v_m_s",
-    "delta_v_m_s",
-    "speed_m_s",
-    "phase_angle_deg",
-    "geocentric_distance_km",
-    "diameter_m",
-    "apparent_magnitude",
-)
 # what the Minor Planet Center publishes; the files change daily, so no hash is known beforehand
 _PUBLISHED = {
     "nea": "https://www.minorplanetcenter.net/iau/MPCORB/NEA.txt",
@@ -162,7 +156,7 @@ def escape(
     path = output or Path("runs") / f"{request.name}-tour-escape.h5"
     if dry_run:
         facts = {"run": str(path), "scenario": request.name, **request.asked()}
-        _print_facts(facts, as_json)
+        print_facts(facts, as_json)
         return
     outcome = run_escape(request, path, RunOptions(WorkPlan(), resume, force), voice.say)
     _say_written(outcome, path, voice)
@@ -223,11 +217,11 @@ def print_run(run: TourRun | EscapeRun, path: Path, as_json: bool) -> None:
     from landing_cli.tour.escape_records import EscapeRun
 
     if isinstance(run, EscapeRun):
-        _print_escape(run, path, as_json)
+        print_escape(run, path, as_json)
     elif run.facts.kind == "compare":
-        _print_comparison(run, path, as_json)
+        print_comparison(run, path, as_json)
     else:
-        _print_search(run, path, as_json)
+        print_search(run, path, as_json)
 
 
 def print_verification(reports: Sequence[Report], path: Path, as_json: bool) -> None:
@@ -301,7 +295,7 @@ def _carry_out(
             voice.say(f"tour.targets.exclude: {name} is not in {case.catalogue.source}")
     path = output or Path("runs") / f"{case.name}-tour-{command}.h5"
     if dry_run:
-        _print_facts({"run": str(path), **case_facts(case)}, as_json)
+        print_facts({"run": str(path), **case_facts(case)}, as_json)
         return
     guard.hint_on_interrupt(f"finished flights are kept: continue with --resume (output {path})")
     options: RunOptions = RunOptions(work, resume, force)
@@ -313,34 +307,6 @@ def _carry_out(
     _say_written(outcome, path, voice)
     print_run(outcome.run, path, as_json)
     _judge(outcome, path, voice)
-
-
-def case_facts(case: TourCase) -> dict[str, Any]:
-    """Tell what a tour's scenario comes to, for `--dry-run` and `landing scenario check`.
-
-    Parameters
-    ----------
-    case : TourCase
-        The case.
-
-    Returns
-    -------
-    dict
-    """
-    from landing_cli.tour.time_scales import t_s_to_utc
-
-    return {
-        "scenario": case.name,
-        "catalogue": case.catalogue.source,
-        "rows": len(case.catalogue) + len(case.catalogue.bad_rows),
-        "bad_rows": len(case.catalogue.bad_rows),
-        "targets": len(case.targets),
-        "departure_utc": t_s_to_utc(case.departure.t_s),
-        "end_utc": t_s_to_utc(case.limits.end_t_s),
-        "delta_v_max_m_s": case.limits.delta_v_m_s,
-        "ephemeris": case.kernel,
-        "catalogue_sha256": case.catalogue.sha256,
-    }
 
 
 def _say_catalogue(case: TourCase, voice: console.Console) -> None:
@@ -359,73 +325,6 @@ def _say_written(outcome: Outcome, path: Path, voice: console.Console) -> None:
         voice.say(f"{path} is up to date: same scenario, catalogue and version (--force solves again)")
     else:
         voice.say(f"wrote {path}")
-
-
-def _print_facts(facts: dict[str, Any], as_json: bool) -> None:
-    if as_json:
-        console.print_json(facts)
-    else:
-        console.print_table(["quantity", "value"], [[key, value] for key, value in facts.items()])
-
-
-def _print_search(run: TourRun, path: Path, as_json: bool) -> None:
-    from landing_cli.tour.summary import summarise_run
-
-    told = summarise_run(run)
-    if as_json:
-        console.print_json({"run": str(path), "scenario": run.facts.name, **told})
-        return
-    chains = told["chains"]
-    rows = [
-        [
-            *(chain[key] for key in _CHAIN_COLUMNS[:5]),
-            "front" if chain["name"] in told["front"] else "",
-            ", ".join(chain["targets"]),
-        ]
-        for chain in chains[:_SHOWN]
-    ]
-    if rows:
-        console.print_table(_CHAIN_COLUMNS, rows, title=f"Chains flown in N-body: {run.facts.name}")
-        more = f"; {len(chains) - _SHOWN} more in the file" if len(chains) > _SHOWN else ""
-        console.print_text(f"\nFlybys of {chains[0]['name']}{more}")
-        flybys = [[row[key] for key in _FLYBY_COLUMNS] for row in chains[0]["flybys"]]
-        console.print_table(_FLYBY_COLUMNS, flybys)
-
-
-def _print_comparison(run: TourRun, path: Path, as_json: bool) -> None:
-    from landing_cli.tour.comparison import TABLE_COLUMNS, compare_with_paper
-
-    told = compare_with_paper(run)
-    if as_json:
-        console.print_json({"run": str(path), "scenario": run.facts.name, **told})
-        return
-    rows = [[row[key] for key in TABLE_COLUMNS] for row in told["flybys"]]
-    console.print_table(TABLE_COLUMNS, rows, title="Liu et al. (2023), Table 2, and the same flown again")
-    for scheme in told["schemes"]:
-        console.print_text(f"\nscheme {scheme['number']}: {scheme['told']}")
-    console.print_text("\n" + "\n".join(told["notes"]))
-
-
-def _print_escape(run: EscapeRun, path: Path, as_json: bool) -> None:
-    from landing_cli.tour.comparison import escape_beside_paper, escape_table
-
-    told = escape_beside_paper(run)
-    if as_json:
-        console.print_json({"run": str(path), **told})
-        return
-    for entry in run.cases:
-        columns, rows = escape_table(entry)
-        console.print_text(f"{entry.name}: velocity increment, m/s; apoapsis altitude in km to the right")
-        console.print_table(columns, rows)
-        console.print_text("")
-    corners, flights = told["corners"], told["flights"]
-    if corners:
-        console.print_table(list(corners[0]), [list(row.values()) for row in corners])
-    if flights:
-        console.print_text("")
-        columns = [key for key in flights[0] if key != "told"]
-        console.print_table(columns, [[row[key] for key in columns] for row in flights])
-        console.print_text("\n" + "\n".join(told["notes"]))
 
 
 def _judge(outcome: Outcome, path: Path, voice: console.Console) -> None:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.errors import InputRefused
-from landing_cli.observe.records import Clustering, ObserveCase, Path, Side, SteeringOptions
+from landing_cli.observe.observed import Clustering, Path
+from landing_cli.observe.records import ObserveCase, Side, SteeringOptions
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

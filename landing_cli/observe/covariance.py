@@ -15,8 +15,9 @@ from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.field_values import gradients
 from landing_cli.kernel import kernel
 from landing_cli.observe.measurements import hard_sight, information_along
+from landing_cli.observe.observed import Path, Seen, Sigma
 from landing_cli.observe.path_samples import positions_at
-from landing_cli.observe.records import ObserveCase, Path, Prior, Seen, Sigma
+from landing_cli.observe.records import ObserveCase, Prior
 
 FloatArray = NDArray[np.float64]
 

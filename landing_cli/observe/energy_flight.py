@@ -11,7 +11,8 @@ from scipy import sparse
 
 from landing_cli.flight.acceleration_control import natural_accelerations
 from landing_cli.flight.linearised_arcs import LinearisedArcs, linearised_arcs
-from landing_cli.observe.records import ObserveCase, Waypoints
+from landing_cli.observe.observed import Waypoints
+from landing_cli.observe.records import ObserveCase
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

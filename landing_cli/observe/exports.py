@@ -8,8 +8,9 @@ import numpy as np
 
 from landing_cli.errors import InputRefused
 from landing_cli.flight.trajectory import Trajectory
+from landing_cli.observe.observed import Path
 from landing_cli.observe.path_values import velocity_increments
-from landing_cli.observe.records import ObserveCase, Path
+from landing_cli.observe.records import ObserveCase
 from landing_cli.observe.stored import ObservationEntry, ObserveRun
 from landing_cli.observe.summary import summarise
 from landing_cli.results.oem import landing_oem

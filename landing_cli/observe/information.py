@@ -28,8 +28,9 @@ from landing_cli.observe.information_program import (
     transitions_along,
 )
 from landing_cli.observe.measurements import hard_sight, information_along
+from landing_cli.observe.observed import Path
 from landing_cli.observe.path_values import path_of
-from landing_cli.observe.records import InformationOptions, ObserveCase, Path, PathStatus
+from landing_cli.observe.records import InformationOptions, ObserveCase, PathStatus
 from landing_cli.observe.visibility import seen_at, sensor_times
 from landing_cli.optimize.cone_program import ConeOptions
 from landing_cli.optimize.curved_program import CurvedSolution, solve_curved_program

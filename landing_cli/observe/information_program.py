@@ -25,8 +25,9 @@ from landing_cli.body.gravity.field_values import accelerations, accelerations_a
 from landing_cli.flight.linear_arcs import frame_slopes
 from landing_cli.observe.covariance import mean_sigma_with_slopes, state_transitions
 from landing_cli.observe.measurements import information_along, information_slopes, soft_sight
+from landing_cli.observe.observed import Path
 from landing_cli.observe.path_samples import positions_at
-from landing_cli.observe.records import ObserveCase, Path
+from landing_cli.observe.records import ObserveCase
 from landing_cli.observe.spline_path import SplineSamples, knot_times, spline_samples
 from landing_cli.observe.visibility import clear_lines, lit, sensor_times, sunlit_lines
 from landing_cli.optimize.cone_records import ConeBlock, SmoothRows

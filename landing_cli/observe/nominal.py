@@ -15,8 +15,9 @@ from landing_cli.flight.energy_guidance import (
 )
 from landing_cli.flight.field_along import field_along
 from landing_cli.flight.linear_arcs import frame_slopes
+from landing_cli.observe.observed import Path
 from landing_cli.observe.path_values import path_of
-from landing_cli.observe.records import ObserveCase, Path, PathStatus
+from landing_cli.observe.records import ObserveCase, PathStatus
 
 FloatArray = NDArray[np.float64]
 

@@ -13,7 +13,8 @@ from landing_cli.observe.clusters import cluster
 from landing_cli.observe.information import Candidate, best_spline, flown
 from landing_cli.observe.information_program import SplineFlight, knots_of, spline_flight
 from landing_cli.observe.nominal import nominal_path
-from landing_cli.observe.records import ObserveCase, ObservedPath, Path, SteeringOptions
+from landing_cli.observe.observed import ObservedPath, Path
+from landing_cli.observe.records import ObserveCase, SteeringOptions
 from landing_cli.observe.tasks import observed
 from landing_cli.observe.transcription import least_energy_path
 from landing_cli.observe.waypoints import waypoints_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.observe.records import Path
+from landing_cli.observe.observed import Path
 
 FloatArray = NDArray[np.float64]
 

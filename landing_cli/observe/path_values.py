@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from landing_cli.body.clearance import TOUCHDOWN_TOLERANCE_M, path_clearance
 from landing_cli.flight.spacecraft import Spacecraft
-from landing_cli.observe.records import ObserveCase, Path, PathStatus
+from landing_cli.observe.observed import Path
+from landing_cli.observe.records import ObserveCase, PathStatus
 
 FloatArray = NDArray[np.float64]
 

@@ -20,14 +20,8 @@ from landing_cli.observe.cases import observe_case
 from landing_cli.observe.clusters import cluster
 from landing_cli.observe.landmark_source import with_landmarks_hash
 from landing_cli.observe.nominal import nominal_path
-from landing_cli.observe.records import (
-    InformationOptions,
-    Objective,
-    Observation,
-    ObserveCase,
-    Parameter,
-    SteeringOptions,
-)
+from landing_cli.observe.observed import Observation
+from landing_cli.observe.records import InformationOptions, Objective, ObserveCase, Parameter, SteeringOptions
 from landing_cli.observe.stored import (
     CPU_ATTRIBUTE,
     MISSION,

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.errors import InputRefused
 from landing_cli.flight.spacecraft import Spacecraft
-from landing_cli.observe.records import Clustering, Objective, Observation, ObserveCase, ObservedPath
+from landing_cli.observe.observed import Clustering, Observation, ObservedPath
+from landing_cli.observe.records import Objective, ObserveCase
 from landing_cli.observe.stored_case import case_from_group, case_to_group
 from landing_cli.observe.stored_clusters import clustering_from_group, clustering_to_group
 from landing_cli.observe.stored_paths import (

@@ -6,7 +6,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from landing_cli.observe.records import Clustering, Side
+from landing_cli.observe.observed import Clustering
+from landing_cli.observe.records import Side
 from landing_cli.observe.stored_paths import LARGEST
 from landing_cli.results.body_checks import bounded
 from landing_cli.results.tree import Dataset, Group

@@ -8,16 +8,8 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.observe.records import (
-    REJECTIONS,
-    ObservedPath,
-    Path,
-    PathStatus,
-    Seen,
-    Sigma,
-    Waypoints,
-    WaypointTiming,
-)
+from landing_cli.observe.observed import ObservedPath, Path, Seen, Sigma, Waypoints
+from landing_cli.observe.records import REJECTIONS, PathStatus, WaypointTiming
 from landing_cli.results.body_checks import bounded
 from landing_cli.results.tree import Dataset, Group
 

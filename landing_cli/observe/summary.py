@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from landing_cli.observe.observed import ObservedPath, Path
 from landing_cli.observe.path_samples import positions_at
-from landing_cli.observe.records import ObserveCase, ObservedPath, Path
+from landing_cli.observe.records import ObserveCase
 from landing_cli.observe.stored import ObservationEntry
 
 

@@ -7,18 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from landing_cli.observe.covariance import sigma_along
+from landing_cli.observe.observed import Clustering, Observation, ObservedPath, Path, Waypoints
 from landing_cli.observe.path_samples import positions_at
-from landing_cli.observe.records import (
-    Clustering,
-    InformationOptions,
-    Observation,
-    ObserveCase,
-    ObservedPath,
-    Parameter,
-    Path,
-    SteeringOptions,
-    Waypoints,
-)
+from landing_cli.observe.records import InformationOptions, ObserveCase, Parameter, SteeringOptions
 from landing_cli.observe.transcription import least_energy_path
 from landing_cli.observe.visibility import seen_along, unseen_reason
 from landing_cli.observe.waypoints import waypoints_of

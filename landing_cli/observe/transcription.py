@@ -29,8 +29,9 @@ from landing_cli.observe.energy_flight import (
     flight_arcs,
     spline_positions,
 )
+from landing_cli.observe.observed import Path, Waypoints
 from landing_cli.observe.path_values import path_of
-from landing_cli.observe.records import ObserveCase, Path, PathStatus, Waypoints
+from landing_cli.observe.records import ObserveCase, PathStatus
 
 FloatArray = NDArray[np.float64]
 

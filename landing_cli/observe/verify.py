@@ -19,9 +19,10 @@ from landing_cli.body.clearance import TOUCHDOWN_TOLERANCE_M
 from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.polyhedron import polyhedron_field
 from landing_cli.flight.replay import replay
+from landing_cli.observe.observed import ObservedPath, Path, Waypoints
 from landing_cli.observe.path_samples import positions_at
 from landing_cli.observe.path_values import CLEARANCE_TOLERANCE_M, GLIDE_SLOPE_TOLERANCE_RAD, path_of
-from landing_cli.observe.records import ObserveCase, ObservedPath, Path, Waypoints
+from landing_cli.observe.records import ObserveCase
 from landing_cli.observe.stored import ObservationEntry
 from landing_cli.observe.tasks import observed
 from landing_cli.parallel import LostChunk, WorkPlan, run_chunks

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from landing_cli.body.ray_cast import is_obstructed
 from landing_cli.observe.illumination import is_light_needed, is_sun_high, sun_directions
+from landing_cli.observe.observed import Path, Seen
 from landing_cli.observe.path_samples import positions_at
-from landing_cli.observe.records import REJECTIONS, ObserveCase, Path, Seen, Sensor, SiteFrame
+from landing_cli.observe.records import REJECTIONS, ObserveCase, Sensor, SiteFrame
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.flight.bezier_curve import bezier_basis
-from landing_cli.observe.records import ObserveCase, SteeringOptions, Waypoints, WaypointTiming
+from landing_cli.observe.observed import Waypoints
+from landing_cli.observe.records import ObserveCase, SteeringOptions, WaypointTiming
 
 FloatArray = NDArray[np.float64]
 

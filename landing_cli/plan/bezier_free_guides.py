@@ -11,11 +11,12 @@ from landing_cli.errors import InputRefused
 from landing_cli.flight.bezier_curve import bezier_basis
 from landing_cli.flight.legs import BezierLeg
 from landing_cli.optimize.cone_program import ConeSolution, solve_cone_program
-from landing_cli.plan.assess import plan_of, sampled_flight
+from landing_cli.plan.assess import plan_of
 from landing_cli.plan.cone_entry import FINE, first_time_to_go, search_case, search_cone_entry
 from landing_cli.plan.free_flight import EXCESS_TOLERANCE, verdict
 from landing_cli.plan.free_guides import FreeGuides, control_points, free_guides_program, guides_through
 from landing_cli.plan.records import CHECK_SAMPLES, FreeGuidesOptions, Parameter, Plan, PlanCase
+from landing_cli.plan.sampled_flight import sampled_flight
 from landing_cli.plan.starting_paths import starting_paths
 
 FloatArray = NDArray[np.float64]

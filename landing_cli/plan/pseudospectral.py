@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from landing_cli.flight.trajectory import Trajectory
 from landing_cli.optimize.cone_program import ConeSolution, solve_cone_program
-from landing_cli.plan.assess import Measured, accelerations_at, broken_constraints, measure, no_plan, plan_of
+from landing_cli.plan.assess import Measured, broken_constraints, measure, no_plan, plan_of
 from landing_cli.plan.cone_entry import FINE, ROUGH, first_time_to_go, search_cone_entry
 from landing_cli.plan.gauss_program import (
     GaussProblem,
@@ -34,6 +34,7 @@ from landing_cli.plan.records import (
     PlanStatus,
     PseudospectralOptions,
 )
+from landing_cli.plan.sampled_flight import accelerations_at
 from landing_cli.plan.starting_paths import boundary_cubic, starting_paths
 
 FloatArray = NDArray[np.float64]

@@ -18,8 +18,8 @@ from landing_cli.errors import InputRefused
 from landing_cli.flight.legs import AccelerationLeg
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.flight.trajectory import Trajectory
-from landing_cli.plan.assess import sampled_flight
 from landing_cli.plan.records import Plan, PlanCase, PlanStatus
+from landing_cli.plan.sampled_flight import sampled_flight
 from landing_cli.plan.stored_legs import (
     LEG_DATA,
     kind_of,

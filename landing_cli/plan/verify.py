@@ -20,8 +20,9 @@ from landing_cli.body.gravity.polyhedron import polyhedron_field
 from landing_cli.flight.replay import replay
 from landing_cli.flight.trajectory import Trajectory
 from landing_cli.parallel import LostChunk, WorkPlan, run_chunks
-from landing_cli.plan.assess import Measured, accelerations_at, at_times, measure_trajectory
+from landing_cli.plan.assess import Measured, measure_trajectory
 from landing_cli.plan.records import CHECK_SAMPLES, Plan, PlanCase
+from landing_cli.plan.sampled_flight import accelerations_at, at_times
 from landing_cli.plan.stored import PlanEntry
 from landing_cli.results.verification import Check, FieldReport
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from landing_cli.errors import InputRefused
-from landing_cli.scenario.load import Document, parse
+from landing_cli.scenario.document import Document, parse
 from landing_cli.sources.landmark_files import (
     LandmarkEntry,
     LandmarkTable,

@@ -13,7 +13,8 @@ from landing_cli.body.clearance import closest_facets
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.body.mesh import Mesh, facet_normals
 from landing_cli.flight.spacecraft import Spacecraft
-from landing_cli.observe.records import Landmarks, ObserveCase, Path, Prior, Sensor
+from landing_cli.observe.observed import Path
+from landing_cli.observe.records import Landmarks, ObserveCase, Prior, Sensor
 from landing_cli.observe.site_frame import site_frame
 
 GM_M3_S2 = 100.0

@@ -17,8 +17,8 @@ from landing_cli.body.mesh import Mesh, facet_centroids, facet_normals
 from landing_cli.flight.replay import replay
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.flight.trajectory import Trajectory
+from landing_cli.observe.observed import Path as FlownPath
 from landing_cli.observe.records import Landmarks, ObserveCase, Prior, Sensor
-from landing_cli.observe.records import Path as FlownPath
 from landing_cli.observe.site_frame import site_frame
 
 INNER_M = np.array([[-28.67, 71.88], [1.92, 21.90]])

@@ -14,7 +14,8 @@ from landing_cli.errors import InputRefused
 from landing_cli.observe.cases import observe_case
 from landing_cli.observe.clusters import cluster, elbow, k_means, projected, side_and_way
 from landing_cli.observe.features import ThomasField, thomas_points
-from landing_cli.observe.records import Clustering, SteeringOptions
+from landing_cli.observe.observed import Clustering
+from landing_cli.observe.records import SteeringOptions
 from landing_cli.scenario.build import build
 from landing_cli.scenario.load import load
 

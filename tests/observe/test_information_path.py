@@ -13,8 +13,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.observe.covariance import sigma_along
 from landing_cli.observe.information import most_informative_path
+from landing_cli.observe.observed import Path
 from landing_cli.observe.pareto import front_about
-from landing_cli.observe.records import InformationOptions, ObserveCase, Path
+from landing_cli.observe.records import InformationOptions, ObserveCase
 from landing_cli.observe.transcription import least_energy_path
 from landing_cli.observe.visibility import seen_along
 

@@ -12,8 +12,9 @@ import pytest
 from observe_scenario_samples import write_pebble
 
 from landing_cli.errors import InputRefused
+from landing_cli.observe.observed import Clustering, ObservedPath
 from landing_cli.observe.pipeline import ground_of, request_of
-from landing_cli.observe.records import Clustering, ObserveCase, ObservedPath
+from landing_cli.observe.records import ObserveCase
 from landing_cli.observe.stored import (
     CPU_ATTRIBUTE,
     ObservationEntry,

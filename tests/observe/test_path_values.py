@@ -11,6 +11,7 @@ from scipy.integrate import quad
 from seeing_samples import landmarks_at, observe_case
 from shape_helpers import box
 
+from landing_cli.observe.observed import Seen
 from landing_cli.observe.path_samples import positions_at
 from landing_cli.observe.path_values import (
     control_energy,
@@ -19,7 +20,7 @@ from landing_cli.observe.path_values import (
     samples_between,
     velocity_increments,
 )
-from landing_cli.observe.records import ObserveCase, Seen
+from landing_cli.observe.records import ObserveCase
 
 TIMES = np.array([0.0, 1.5, 4.0, 4.5, 9.0])
 

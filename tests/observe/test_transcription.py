@@ -21,8 +21,9 @@ from landing_cli.observe.energy_flight import (
     inverse_dynamics,
     spline_positions,
 )
+from landing_cli.observe.observed import Path, Waypoints
 from landing_cli.observe.path_values import control_energy
-from landing_cli.observe.records import ObserveCase, Path, SteeringOptions, Waypoints
+from landing_cli.observe.records import ObserveCase, SteeringOptions
 from landing_cli.observe.transcription import least_energy_path
 from landing_cli.observe.waypoints import waypoints_of
 

@@ -11,8 +11,8 @@ from landing_cli.flight.acceleration_control import thrust_accelerations
 from landing_cli.flight.bezier_curve import curve_states, first_control_points, last_control_points
 from landing_cli.flight.legs import AccelerationLeg, BezierLeg, GaussAccelerationLeg, LinearAccelerationLeg
 from landing_cli.flight.replay import replay
-from landing_cli.plan.assess import sampled_flight
 from landing_cli.plan.records import PlanCase
+from landing_cli.plan.sampled_flight import sampled_flight
 
 CASE = lumpy_case()
 SPIN = CASE.asteroid.rotation_rate_rad_s

@@ -17,10 +17,10 @@ from landing_cli.body.mesh import facet_centroids
 from landing_cli.errors import InputRefused
 from landing_cli.flight.legs import BezierLeg
 from landing_cli.flight.replay import replay
-from landing_cli.plan.assess import sampled_flight
 from landing_cli.plan.bezier_free_guides import plan_bezier_free_guides
 from landing_cli.plan.convex import plan_convex
 from landing_cli.plan.records import ConvexOptions, FreeGuidesOptions, Plan, PlanCase
+from landing_cli.plan.sampled_flight import sampled_flight
 
 RADIUS_M = 8000.0
 

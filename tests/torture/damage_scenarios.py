@@ -16,7 +16,7 @@ from programs import ROOT, Tally
 from landing_cli.cli.guard import told
 from landing_cli.cli.scenario import check
 from landing_cli.errors import ExitCode
-from landing_cli.scenario.load import parse
+from landing_cli.scenario.document import parse
 
 SHIPPED = sorted((ROOT / "configs").glob("**/*.yaml"))
 

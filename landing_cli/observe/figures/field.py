@@ -22,7 +22,7 @@ from landing_cli.observe.figures.parts import (
     site_points,
     title_of,
 )
-from landing_cli.observe.records import Clustering
+from landing_cli.observe.observed import Clustering
 from landing_cli.observe.stored import ObservationEntry
 from landing_cli.results import plotting
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from landing_cli.observe.figures.parts import UNSTEERED, colour_of, facts_of, label_of, title_of
-from landing_cli.observe.records import ObservedPath
+from landing_cli.observe.observed import ObservedPath
 from landing_cli.observe.stored import ObservationEntry
 from landing_cli.results import plotting
 

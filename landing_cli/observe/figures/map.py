@@ -24,8 +24,9 @@ from landing_cli.observe.figures.parts import (
     title_of,
     told_of,
 )
+from landing_cli.observe.observed import ObservedPath
 from landing_cli.observe.path_samples import positions_at
-from landing_cli.observe.records import ObserveCase, ObservedPath
+from landing_cli.observe.records import ObserveCase
 from landing_cli.observe.stored import ObservationEntry
 from landing_cli.results import plotting
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.body.ray_cast import first_hits
-from landing_cli.observe.records import ObserveCase, ObservedPath
+from landing_cli.observe.observed import ObservedPath
+from landing_cli.observe.records import ObserveCase
 from landing_cli.observe.stored import ObservationEntry
 from landing_cli.results import plotting
 
