@@ -17,15 +17,8 @@ from landing_cli.flight.trajectory import Trajectory
 from landing_cli.optimize.cone_program import ConeSolution, solve_cone_program
 from landing_cli.plan.assess import Measured, broken_constraints, measure, no_plan, plan_of
 from landing_cli.plan.cone_entry import FINE, ROUGH, first_time_to_go, search_cone_entry
-from landing_cli.plan.gauss_program import (
-    GaussProblem,
-    build_program,
-    gauss_problem,
-    node_positions,
-    phase_flights,
-    start_point,
-    velocity_increment_m_s,
-)
+from landing_cli.plan.gauss_problem import GaussProblem, gauss_problem, phase_flights
+from landing_cli.plan.gauss_program import build_program, node_positions, start_point, velocity_increment_m_s
 from landing_cli.plan.records import (
     CHECK_SAMPLES,
     Parameter,

@@ -15,7 +15,8 @@ from landing_cli.optimize.collocation import gauss_span
 from landing_cli.plan import gauss_program
 from landing_cli.plan.convex import plan_convex
 from landing_cli.plan.gauss_phases import Phase, fly_phase
-from landing_cli.plan.gauss_program import build_program, gauss_problem, start_point, velocity_increment_m_s
+from landing_cli.plan.gauss_problem import gauss_problem
+from landing_cli.plan.gauss_program import build_program, start_point, velocity_increment_m_s
 from landing_cli.plan.pseudospectral import phase_nodes, plan_pseudospectral, without_terrain
 from landing_cli.plan.records import ConvexOptions, PlanCase, PseudospectralOptions
 
