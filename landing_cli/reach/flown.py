@@ -20,7 +20,8 @@ def rows_with_flight(solutions: FacetSolutions) -> NDArray[np.bool_]:
     """Which rows store a flight that can be flown again, (n,) bool."""
     rows = solutions.rows
     controlled = (rows["thrust_nodes"] > 0) | np.isfinite(rows["costates"]).all(axis=1)
-    return np.asarray(controlled & np.isfinite(rows["handover_position_m"]).all(axis=1))
+    handed_over = np.isfinite(rows["handover_position_m"]) & np.isfinite(rows["handover_velocity_m_s"])
+    return np.asarray(controlled & handed_over.all(axis=1))
 
 
 def asked_row(result: CaseResult, facet: int) -> int:

@@ -8,6 +8,7 @@ import numpy as np
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.field import GravityField, GravityKind
+from landing_cli.body.mesh import facet_areas
 from landing_cli.flight.spacecraft import Spacecraft
 
 # what a scenario may ask for at most
@@ -18,7 +19,7 @@ _LARGEST = {
     "isp_s": 1e6,
     "propellant_kg": 1e7,
     "vertices": 1e9,
-    "rotation_rate_rad_s": 1.0,
+    "rotation_rate_rad_s": 0.2,
     "gravity_params": 1e33,
 }
 _PARAMETERS = {GravityKind.POINT_MASS: 1, GravityKind.HARMONICS: 7, GravityKind.DIPOLE: 6}
@@ -43,8 +44,12 @@ def check_asteroid(asteroid: Asteroid) -> None:
     if not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
         raise ValueError("a facet refers to a vertex that does not exist")
     bounded("vertices", mesh.vertices, _LARGEST["vertices"])
+    if not facet_areas(mesh).min() > 0.0:
+        raise ValueError("a facet has no area")
     positive("gm_m3_s2", asteroid.gm_m3_s2, _LARGEST["gm_m3_s2"])
     bounded("rotation_rate_rad_s", asteroid.rotation_rate_rad_s, _LARGEST["rotation_rate_rad_s"])
+    if asteroid.rotation_rate_rad_s < 0.0:
+        raise ValueError("rotation_rate_rad_s is negative: +z is the axis of the spin")
     _check_gravity(asteroid.gravity)
 
 
@@ -63,6 +68,8 @@ def check_spacecraft(craft: Spacecraft) -> None:
     """
     for name, value in vars(craft).items():
         if value is not None:
+            if not isinstance(value, int | float):
+                raise ValueError(f"{name} is no number")
             positive(name, value, _LARGEST[name])
 
 

@@ -126,9 +126,11 @@ def read(path: Path) -> StoredResult:
         raise _refused(path, f"cannot be read as HDF5: {error}") from error
     attributes = dict(root.attributes)
     version = attributes.get("schema_version")
-    if version != SCHEMA_VERSION:
+    if type(version) is not int or version != SCHEMA_VERSION:
         told = f"is of schema version {version}, and this program reads {SCHEMA_VERSION}"
         raise InputRefused(told, where=str(path), fix="use the version of the program that wrote it")
+    if type(attributes.get("complete", 0)) is not int:
+        raise _refused(path, "does not say whether it is complete")
     stated = attributes.pop(DIGEST, None)
     provenance = root.members.get(PROVENANCE, Group())
     tree = Group({n: m for n, m in root.members.items() if n != PROVENANCE}, attributes)

@@ -113,11 +113,22 @@ class _Parser:
         if names - OWN_ATTRIBUTES or not {"units", "description"} <= names:
             raise Distrusted(f"{path}: has other attributes than it should")
         told: dict[str, Any] = {name: _attribute(place, name, path) for name in names}
-        flags = None
-        if "flag_values" in told:
-            flags = dict(zip(told["flag_values"].tolist(), told["flag_meanings"].split(), strict=True))
+        if not (isinstance(told["units"], str) and isinstance(told["description"], str)):
+            raise Distrusted(f"{path}: its unit or description is no text")
+        flags = _flags(told.get("flag_values"), told.get("flag_meanings"), path)
         dims = tuple(str(dim.label) for dim in place.dims)
         return Dataset(data, told["units"], told["description"], dims, flags)
+
+
+def _flags(values: Attribute | None, words: Attribute | None, path: str) -> dict[int, str] | None:
+    """What the values of an enumeration mean; None for a plain quantity."""
+    if values is None and words is None:
+        return None
+    if not (isinstance(values, np.ndarray) and values.dtype.kind in "iu" and isinstance(words, str)):
+        raise Distrusted(f"{path}: the meanings of its values are of the wrong kind")
+    if len(values) != len(words.split()):
+        raise Distrusted(f"{path}: has {len(words.split())} meanings for {len(values)} values")
+    return dict(zip(values.tolist(), words.split(), strict=True))
 
 
 def _is_bare_dimension(place: h5py.Dataset) -> bool:
