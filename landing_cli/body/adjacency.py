@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from landing_cli.body.mesh import FloatArray, IntArray, Mesh, facet_areas
 from landing_cli.errors import InputRefused
@@ -93,7 +96,7 @@ def equilateral_height_m(mesh: Mesh) -> float:
     return float(np.sqrt(np.sqrt(3.0) * facet_areas(mesh)).mean())
 
 
-def components(neighbours: IntArray, kind: IntArray) -> IntArray:
+def components(neighbours: IntArray, kind: NDArray[Any]) -> IntArray:
     """Tell apart the parts of a surface that hang together along edges and are of one kind.
 
     Parameters

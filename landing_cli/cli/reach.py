@@ -83,9 +83,7 @@ def run(
     overrides: Overrides = None,
     compare: Annotated[
         bool,
-        typer.Option(
-            "--compare", help="Run the traversal, and the section (or trace) method to compare with it."
-        ),
+        typer.Option("--compare", help="Run section (or trace) and the traversal, and compare them."),
     ] = False,
     dry_run: DryRun = False,
     as_json: Json = False,

@@ -71,6 +71,23 @@ class Outcome:
     up_to_date: bool
 
 
+class Counter:
+    """Tells how many facets are done of those that were asked for so far."""
+
+    def __init__(self, progress: Callable[[int, int], None]) -> None:
+        self._progress = progress
+        self._done = self._total = 0
+
+    def expect(self, facets: int) -> None:
+        """More facets are asked for."""
+        self._total += facets
+
+    def __call__(self, facets: int) -> None:
+        """More facets are done."""
+        self._done += facets
+        self._progress(self._done, self._total)
+
+
 @dataclass(frozen=True)
 class Solver:
     """Solves facets of every case, recording each chunk."""
@@ -78,7 +95,7 @@ class Solver:
     prepared: tuple[PreparedCase, ...]
     journal: Journal
     plan: WorkPlan
-    told: Callable[[int], None]
+    progress: Counter
 
     @property
     def facets(self) -> int:
@@ -87,14 +104,16 @@ class Solver:
 
     def __call__(self, stage: str, items: NDArray[np.int64]) -> tuple[FacetSolutions, dict[int, str]]:
         """Solve items; see `facet_work` for what an item is."""
+        self.progress.expect(len(items))
         work = partial(solve_items, self.prepared, self.facets)
-        return solve_recorded(self.journal, stage, in_chunks(items), work, self.plan, self.told)
+        return solve_recorded(self.journal, stage, in_chunks(items), work, self.plan, self.progress)
 
     def trace(self, stage: str, items: NDArray[np.int64]) -> tuple[FacetSolutions, dict[int, str]]:
         """Solve items with their thrust margins."""
+        self.progress.expect(len(items))
         work = partial(traced_work.solve_traced, self.prepared, self.facets)
         chunks = in_chunks(items, traced_work.CHUNK_FACETS)
-        return solve_recorded(self.journal, stage, chunks, work, self.plan, self.told, part_of_stage=True)
+        return solve_recorded(self.journal, stage, chunks, work, self.plan, self.progress, part_of_stage=True)
 
 
 def run(
@@ -183,15 +202,7 @@ def _solve(
 ) -> tuple[CaseResult, ...]:
     """Solve all cases by the scenario's method."""
     traverse = reach.method == "traverse" or options.compare
-    total = len(cases) * len(prepared[0].shared.centroids_m) if traverse else 0
-    done = 0
-
-    def told(more: int) -> None:
-        nonlocal done
-        done += more
-        progress(done, max(total, done))
-
-    solver = Solver(prepared, journal, options.plan, told)
+    solver = Solver(prepared, journal, options.plan, Counter(progress))
     results = _traverse(solver, cases) if traverse else ()
     if reach.method == "trace":
         results = tuple(

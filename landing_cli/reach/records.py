@@ -169,8 +169,10 @@ def blank_rows(facets: NDArray[np.integer]) -> NDArray[np.void]:
 
 def join(parts: Sequence[FacetSolutions]) -> FacetSolutions:
     """Put parts together, rows in ascending facet order."""
-    rows = np.concatenate([p.rows for p in parts])
-    nodes = np.concatenate([p.thrust_nodes_n for p in parts]).reshape(-1, 3)
+    # parts are mostly runs of facets: those in order need no second copy, which would be the largest in a run
+    ordered = sorted(parts, key=lambda p: int(p.rows["facet"][0]) if len(p.rows) else -1)
+    rows = np.concatenate([p.rows for p in ordered])
+    nodes = np.concatenate([p.thrust_nodes_n for p in ordered]).reshape(-1, 3)
     if (np.diff(rows["facet"].astype(np.int64)) >= 0).all():
         return FacetSolutions(rows, nodes)
     return take_rows(FacetSolutions(rows, nodes), np.argsort(rows["facet"], kind="stable"))

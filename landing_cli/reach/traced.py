@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from landing_cli.body.adjacency import components, facet_neighbours
 from landing_cli.body.boundary_loops import BoundaryLoops, boundary_loops
 from landing_cli.body.mesh import facet_areas
-from landing_cli.reach.level_estimate import features
 from landing_cli.reach.free_descent import Surroundings
+from landing_cli.reach.level_estimate import features
 from landing_cli.reach.records import Binding, FacetSolutions, LandingCase, Verdict
 from landing_cli.reach.section_sweep import compare_domains
 from landing_cli.reach.trace import Answers, Ask, Ground, TraceResult, trace_domain

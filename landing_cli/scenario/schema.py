@@ -135,7 +135,8 @@ class Reach(Section):
     )
     method: Literal["traverse", "section", "trace"] = Field(
         "traverse",
-        description="how the domain is found: traverse (every facet) | section (the paper's) | trace (boundary)",
+        description="how the domain is found: traverse (every facet) | section (the paper's) | "
+        "trace (its boundary, by the margin)",
     )
     section: SectionMethod = Field(
         SectionMethod(),
@@ -143,7 +144,7 @@ class Reach(Section):
     )
 
     def model_post_init(self, context: Any, /) -> None:
-        """Refuse states without a name or a time of their own, contradicting times, and a trace in the dark."""
+        """Refuse states without a name of their own or without a time, and choices that contradict."""
         self._check_names()
         if self.method == "trace":
             self._check_trace()

@@ -68,7 +68,10 @@ def _fill(place: h5py.Group, group: Group, scales: Scales) -> None:
 def _create(place: h5py.Group, name: str, dataset: Dataset) -> h5py.Dataset:
     data = _storable(dataset.data)
     # An empty array cannot be chunked, and has nothing to check.
-    options: dict[str, Any] = {"chunks": _chunk_shape(data), "fletcher32": True} if data.size else {}
+    # Each chunk is written once: a cache of them would only hold every dataset's until the file is closed.
+    options: dict[str, Any] = {}
+    if data.size:
+        options = {"chunks": _chunk_shape(data), "fletcher32": True, "rdcc_nbytes": 0}
     made = place.create_dataset(name, data=data, track_times=False, **options)
     _set_attribute(made, "units", dataset.units)
     _set_attribute(made, "description", dataset.description)
