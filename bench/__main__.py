@@ -1,4 +1,4 @@
-"""``python -m bench [facets | scaling | end-to-end | clearance | rays | ...]``: one of ``BENCHES``, or all."""
+"""``python -m bench [NAME]``: one of ``BENCHES`` by name, or all of them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Where the CPU of one command goes: ``reach run bennu.yaml`` from start-up to the printed table, caches warm.
+"""Where the CPU of one command goes: ``reach run bennu.yaml`` from start to table, caches warm.
 
-``python -m bench end-to-end`` runs the command in a process of its own with a stopwatch of CPU time around every
-step, and prints the breakdown; what is not solving should be under a third. Beside it, the CPU time of
+``python -m bench end-to-end`` runs the command in a process of its own with a stopwatch of CPU time around
+every step, and prints the breakdown; what is not solving should be under a third. Beside it, the CPU time of
 ``reach --help``.
 """
 
@@ -43,6 +43,8 @@ class Stopwatch:
         self._inner = [0.0]
 
     def around(self, step: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Make a function whose CPU time counts for a step."""
+
         def timed(*args: Any, **options: Any) -> Any:
             begun = time.process_time()
             self._inner.append(0.0)

@@ -1,9 +1,9 @@
-"""How cost grows with the facets: the traversal (CPU, memory) and the trace (solves, misses), on one smooth body.
+"""How cost grows with the facets on one body: the traversal (CPU, memory) and the trace (solves, misses).
 
-``python -m bench scaling`` refines the shipped Bennu by Loop subdivision, runs ``reach run`` on each mesh in a
-process of its own and fits exponents: of the traversal's CPU, whole run but imports, and of the trace's solves.
-The traversal's verdicts tell what the trace missed. ``--flat`` halves edges instead, which keeps the facets of the
-coarse mesh as flat faces with sharp edges: the body that it is, not a smooth one.
+``python -m bench scaling`` refines the shipped Bennu by Loop subdivision, runs ``reach run`` on each mesh in
+a process of its own and fits exponents: of the traversal's CPU, the whole run but its imports, and of the
+trace's solves. The traversal's verdicts tell what the trace missed. ``--flat`` halves edges instead, which
+keeps the facets of the coarse mesh as flat faces with sharp edges between them.
 """
 
 from __future__ import annotations

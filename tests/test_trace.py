@@ -180,9 +180,7 @@ def test_facets_without_a_level_or_a_verdict_do_not_mislead():
 
     def ask(facets: np.ndarray) -> Answers:
         bad = fails[facets]
-        return Answers(
-            (levels[facets] <= 1.0) & ~bad, ~bad, np.where(bad, np.nan, levels[facets])
-        )
+        return Answers((levels[facets] <= 1.0) & ~bad, ~bad, np.where(bad, np.nan, levels[facets]))
 
     found = trace_domain(ground.ground, ask)
     known = found.asked & ~fails
@@ -260,8 +258,12 @@ def test_components_are_numbered_by_their_first_facet():
 def short_run(tmp_path, jobs: int, name: str, *more: str):
     loaded = load(
         "bennu.yaml",
-        ["reach.method=trace", "reach.tof_s=700", "reach.initial_states=[{name: mid_latitude, "
-         "position_km: [0.6, 0, 0.5]}]", *more],
+        [
+            "reach.method=trace",
+            "reach.tof_s=700",
+            "reach.initial_states=[{name: mid_latitude, position_km: [0.6, 0, 0.5]}]",
+            *more,
+        ],
     )
     options = RunOptions(WorkPlan(jobs), resume=True, compare="--compare" in name)
     return run(loaded, tmp_path / f"{name}.h5", options, lambda done, total: None).run
