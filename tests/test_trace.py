@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -14,11 +15,21 @@ from landing_cli.body.bvh import build_surface_index
 from landing_cli.body.mesh import Mesh, facet_areas, facet_centroids, facet_normals
 from landing_cli.errors import InputRefused
 from landing_cli.parallel import WorkPlan
+from landing_cli.reach.consistency import faults_of
+from landing_cli.reach.exports import boundary_table
+from landing_cli.reach.facet_story import tell_facet
+from landing_cli.reach.figures.traced import trace_figure
 from landing_cli.reach.level_estimate import estimate, features
 from landing_cli.reach.pipeline import RunOptions, run
 from landing_cli.reach.records import Verdict
+from landing_cli.reach.stored import run_from_result
+from landing_cli.reach.stored_checks import check_case
 from landing_cli.reach.trace import Answers, Ground, TraceResult, trace_domain
 from landing_cli.reach.traced import LEAST_COMPONENT
+from landing_cli.results.plotting import style, write_png
+from landing_cli.results.store import read
+from landing_cli.results.surface_map import map_surface
+from landing_cli.results.tree import Dataset, Group
 from landing_cli.scenario.load import load
 from landing_cli.scenario.schema import Reach
 
@@ -255,18 +266,11 @@ def test_components_are_numbered_by_their_first_facet():
     assert label[0] == 0
 
 
-def short_run(tmp_path, jobs: int, name: str, *more: str):
-    loaded = load(
-        "bennu.yaml",
-        [
-            "reach.method=trace",
-            "reach.tof_s=700",
-            "reach.initial_states=[{name: mid_latitude, position_km: [0.6, 0, 0.5]}]",
-            *more,
-        ],
-    )
+def short_run(tmp_path, jobs: int, name: str, *more: str, progress=lambda done, total: None):
+    state = "{name: mid_latitude, position_km: [0.6, 0, 0.5]}"
+    chosen = ["reach.method=trace", "reach.tof_s=700", f"reach.initial_states=[{state}]", *more]
     options = RunOptions(WorkPlan(jobs), resume=True, compare="--compare" in name)
-    return run(loaded, tmp_path / f"{name}.h5", options, lambda done, total: None).run
+    return run(load("bennu.yaml", chosen), tmp_path / f"{name}.h5", options, progress).run
 
 
 @pytest.fixture(scope="module")
@@ -311,3 +315,53 @@ def test_a_trace_is_refused_where_levels_do_not_decide(key, value):
     with pytest.raises(InputRefused, match=f"does not decide with {key}: {value}"):
         load("bennu.yaml", ["reach.method=trace", f"reach.{key}={value}"])
     assert Reach.model_fields["method"].default == "traverse"
+
+
+class Stopped(Exception):
+    """Something ended the run."""
+
+
+def test_an_interrupted_trace_continues_to_the_same_bits(compared, tmp_path):
+    whole = short_run(tmp_path, 2, "whole").cases[0]
+    rounds = []
+
+    def stop(done: int, total: int) -> None:
+        rounds.append(total)
+        if len(set(rounds)) == 3 and done > total - 60:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        short_run(tmp_path, 1, "broken", progress=stop)
+    assert (tmp_path / "broken.h5.journal").stat().st_size > 100_000
+    resumed = short_run(tmp_path, 2, "broken").cases[0]
+    np.testing.assert_array_equal(resumed.solutions.rows.tobytes(), whole.solutions.rows.tobytes())
+    assert resumed.summary == whole.summary
+    assert whole.summary["trace"]["N"] == compared.summary["trace"]["N"]
+
+
+def test_a_traced_result_is_read_back_shown_and_held_to_what_it_can_be(compared, tmp_path):
+    path = tmp_path / "stored.h5"
+    written = short_run(tmp_path, 1, "stored").cases[0]
+    stored = run_from_result(read(path)).cases[0]
+    assert faults_of(stored) == faults_of(compared) == ()
+    for name, member in written.boundary.members.items():
+        np.testing.assert_array_equal(stored.boundary.dataset(name).data, member.data)
+    table = boundary_table(stored)
+    assert len(table) == stored.summary["trace"]["boundary_edges"]
+    assert set(table.columns) >= {"loop", "reachable_facet", "unreachable_facet"}
+    with pytest.raises(InputRefused, match="never asked for this facet"):
+        tell_facet(stored, int(np.setdiff1d(np.arange(2692), stored.solutions.rows["facet"])[0]))
+    for name in ("start_vertex", "loop", "seed_facets"):
+        wrong = dict(stored.boundary.members)
+        wrong[name] = Dataset(wrong[name].data + 2500, "1", "", wrong[name].dims)
+        with pytest.raises(ValueError, match="names what does not exist"):
+            check_case(replace(stored, boundary=Group(wrong)))
+    with pytest.raises(ValueError, match="summary/trace is missing"):
+        check_case(replace(stored, summary={k: v for k, v in stored.summary.items() if k != "trace"}))
+
+
+def test_the_trace_is_drawn(compared, tmp_path):
+    surface = map_surface(compared.case.asteroid.mesh)
+    with style():
+        write_png(trace_figure(compared, compared.boundary, surface), tmp_path / "trace.png")
+    assert (tmp_path / "trace.png").stat().st_size > 50_000
