@@ -148,7 +148,8 @@ def main() -> None:
         print(f"solves of the trace: exponent {exponent(sizes, [row['trace']['N'] for row in rows]):.3f}")
         if not options.only_trace:
             cpu = [row["traverse"]["cpu_s"] for row in rows]
-            print(f"CPU of the traversal: exponent {exponent(sizes, cpu):.3f}")
+            print(f"CPU of the traversal: exponent {exponent(sizes, cpu):.3f}", end="")
+            print(f", from {sizes[-2]} to {sizes[-1]} facets {exponent(sizes[-2:], cpu[-2:]):.3f}")
 
 
 if __name__ == "__main__":
