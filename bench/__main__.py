@@ -1,4 +1,4 @@
-"""``python -m bench [facets | clearance | rays | plans | observe | tour | tour-search]``, or all of them."""
+"""``python -m bench [NAME]``: one of ``BENCHES`` by name, or all of them."""
 
 from __future__ import annotations
 
@@ -6,16 +6,20 @@ import sys
 
 from bench import (
     clearance_bench,
+    end_to_end_bench,
     facet_solve,
     observe_bench,
     plan_bench,
     ray_bench,
+    scaling_bench,
     tour_bench,
     tour_search_bench,
 )
 
 BENCHES = {
     "facets": facet_solve.main,
+    "scaling": scaling_bench.main,
+    "end-to-end": end_to_end_bench.main,
     "clearance": clearance_bench.main,
     "rays": ray_bench.main,
     "plans": plan_bench.main,

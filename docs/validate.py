@@ -19,6 +19,7 @@ from validation_plan import landing_plans  # noqa: E402
 from validation_section import claims, draw_azimuths, sections, sweep_all  # noqa: E402
 from validation_solver import against_truth, families  # noqa: E402
 from validation_tour import flyby_tours  # noqa: E402
+from validation_trace import traces  # noqa: E402
 
 from landing_cli.reach.pipeline import RunOptions, run  # noqa: E402
 from landing_cli.scenario.load import load  # noqa: E402
@@ -83,6 +84,8 @@ def main() -> None:
     parts += [verification(runs), sections(swept)]
     say("independent truth, and extremals")
     parts += [against_truth(), families(runs["bennu"]), claims(swept)]
+    say("boundaries followed")
+    parts.append(traces(runs, images))
     say("plans to one site")
     parts.append(landing_plans())
     say("landings that see")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from landing_cli.body.mesh import FloatArray, IntArray, Mesh, facet_areas
 from landing_cli.errors import InputRefused
@@ -91,3 +94,30 @@ def mean_edge_m(mesh: Mesh) -> float:
 def equilateral_height_m(mesh: Mesh) -> float:
     """Mean over the facets of the height of the equilateral triangle of the same area, m."""
     return float(np.sqrt(np.sqrt(3.0) * facet_areas(mesh)).mean())
+
+
+def components(neighbours: IntArray, kind: NDArray[Any]) -> IntArray:
+    """Tell apart the parts of a surface that hang together along edges and are of one kind.
+
+    Parameters
+    ----------
+    neighbours : (m, 3) int
+        Facets across the edges.
+    kind : (m,) int or bool
+        What each facet is.
+
+    Returns
+    -------
+    (m,) int
+        Component of each facet, numbered from 0 by their first facet.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(neighbours)
+    facet, slot = np.nonzero(kind[:, None] == kind[neighbours])
+    other = neighbours[facet, slot]
+    graph = coo_array((np.ones(len(facet), dtype=np.int8), (facet, other)), shape=(count, count))
+    _, labels = connected_components(graph, directed=False)
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    return np.asarray(np.argsort(np.argsort(first))[inverse], dtype=np.int64)

@@ -182,7 +182,7 @@ class Progress:
         rate = self._rate(now, done)
         if now - self._last_line < PLAIN_LINE_EVERY_S and done < total:
             return
-        if done >= total and self._last_line == self._began and now - self._began < 1.0:
+        if done >= total and now - self._last_line < 1.0:
             return  # it took no time: nothing to follow
         self._last_line = now
         speed = f", {rate:.4g} a second" if rate > 0 else ""

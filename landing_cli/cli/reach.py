@@ -33,6 +33,19 @@ if TYPE_CHECKING:
     from landing_cli.scenario.load import LoadedScenario
 
 _COUNTS = ("case", "facets", "reachable", "unreachable", "proved", "unresolved", "reachable_area_m2")
+_TRACE = (
+    "N",
+    "ratio",
+    "seeds",
+    "rounds",
+    "loops",
+    "closed",
+    "domain_facets",
+    "domain_area_m2",
+    "iou",
+    "misclassified",
+    "missed_components",
+)
 _SECTION = ("P_d", "P_r", "P_e", "n", "N", "ratio", "iou", "misclassified")
 
 _VERIFICATION = (
@@ -69,7 +82,8 @@ def run(
     force: StartOver = False,
     overrides: Overrides = None,
     compare: Annotated[
-        bool, typer.Option("--compare", help="Run the section method and the traversal, and compare them.")
+        bool,
+        typer.Option("--compare", help="Run section (or trace) and the traversal, and compare them."),
     ] = False,
     dry_run: DryRun = False,
     as_json: Json = False,
@@ -148,10 +162,14 @@ def print_run(run: ReachRun, path: Path, as_json: bool) -> None:
     ]
     columns = [*_COUNTS, "dv_min_m_s", "dv_median_m_s", "dv_max_m_s", "paths_through_rock"]
     console.print_table(columns, rows, title=f"Reachable domain: {run.asteroid.name}")
-    sections = [(case["case"], case["section"]) for case in cases if case.get("section")]
-    if sections:
-        rows = [[name, *(section.get(key) for key in _SECTION)] for name, section in sections]
-        console.print_table(["case", *_SECTION], rows, title="Section and expansion")
+    for method, shown, title in (
+        ("section", _SECTION, "Section and expansion"),
+        ("trace", _TRACE, "Trace of the boundary"),
+    ):
+        told = [(case["case"], case[method]) for case in cases if case.get(method)]
+        if told:
+            rows = [[name, *(facts.get(key) for key in shown)] for name, facts in told]
+            console.print_table(["case", *shown], rows, title=title)
 
 
 def print_facet(cases: Sequence[CaseResult], facet: int, path: Path, as_json: bool) -> None:

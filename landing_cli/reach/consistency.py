@@ -56,15 +56,15 @@ def faults_of(result: CaseResult) -> tuple[Fault, ...]:
 
 
 def _faults_of_list(result: CaseResult) -> Iterator[Fault]:
-    """Every facet is listed once, in order; all of them unless only a section was asked."""
+    """Every facet is listed once, in order; all of them unless only a section or a trace was asked."""
     facets, count = result.solutions.rows["facet"], len(result.case.asteroid.mesh.faces)
     again = facets[1:][np.diff(facets) <= 0]
     for facet in again.tolist():
         yield Fault(f"facet {facet} stands in the table twice, or out of order", facet)
     for facet in facets[(facets < 0) | (facets >= count)].tolist():
         yield Fault(f"facet {facet} does not exist", facet)
-    section = result.summary.get("section")
-    traversed = not isinstance(section, dict) or section.get("iou") is not None
+    partial = [result.summary.get(method) for method in ("section", "trace")]
+    traversed = all(not isinstance(part, dict) or part.get("iou") is not None for part in partial)
     missing = np.setdiff1d(np.arange(count), facets)
     if traversed and len(missing):
         yield Fault(f"{len(missing)} facets are missing from the table, the first is {missing[0]}")

@@ -23,7 +23,7 @@ from landing_cli.results.tables import (
     to_json,
     trajectory_table,
 )
-from landing_cli.results.tree import table_group
+from landing_cli.results.tree import Dataset, Group, table_group
 
 export_oem = landing_oem
 
@@ -61,7 +61,8 @@ def boundary_table(result: CaseResult) -> Table:
     Returns
     -------
     Table
-        Facets of the section, the ring, the expansions, the boundary and the domain, below each other.
+        Facets of the section, the ring, the expansions, the boundary and the domain, below each other; of a
+        trace the edges of the boundary, loop after loop.
 
     Raises
     ------
@@ -72,9 +73,12 @@ def boundary_table(result: CaseResult) -> Table:
         raise InputRefused(
             "this run traced no boundary",
             where=result.case.name,
-            fix="run with --set reach.method=section, or with --compare",
+            fix="run with --set reach.method=trace or section, or with --compare",
         )
     lists = result.boundary.members
+    if "loop" in lists:
+        edges = {n: m for n, m in lists.items() if isinstance(m, Dataset) and m.dims == ("edge",)}
+        return group_table(Group(edges))
     if len({result.boundary.dataset(name).dims[0] for name in lists}) == 1:
         return group_table(result.boundary)
     facets = {name.removesuffix("_facets"): result.boundary.dataset(name).data for name in lists}

@@ -20,9 +20,9 @@ Items = NDArray[np.int64]
 CHUNK_FACETS = 256
 
 
-def in_chunks(items: Items) -> list[Items]:
+def in_chunks(items: Items, size: int = CHUNK_FACETS) -> list[Items]:
     """Cut items into chunks of fixed size."""
-    return [items[i : i + CHUNK_FACETS] for i in range(0, len(items), CHUNK_FACETS)]
+    return [items[i : i + size] for i in range(0, len(items), size)]
 
 
 def solve_items(prepared: tuple[PreparedCase, ...], facets: int, items: Items) -> FacetSolutions:

@@ -23,7 +23,15 @@ from landing_cli.reach.delivery import VALUE_COLUMNS, Deliveries, Frame, deliver
 from landing_cli.reach.free_batch import Batch
 from landing_cli.reach.free_flights import Question, best_flights, flights_near
 from landing_cli.reach.free_solve import CERTIFIED, CONVERGED, STALLED
-from landing_cli.reach.records import Binding, FacetSolutions, LandingCase, Verdict, blank_rows
+from landing_cli.reach.records import (
+    Binding,
+    FacetSolutions,
+    LandingCase,
+    Verdict,
+    blank_rows,
+    replace_rows,
+    take_rows,
+)
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
 
 Floats = NDArray[np.float64]
@@ -338,24 +346,6 @@ def _saturated(work: Work) -> Ints:
     full = np.linalg.norm(work.thrust, axis=2) > FULL_THRUST
     reachable = work.rows["verdict"] == Verdict.REACHABLE
     return np.flatnonzero(reachable & (full.mean(axis=1) >= SATURATED_SHARE))
-
-
-def take_rows(solutions: FacetSolutions, places: Ints) -> FacetSolutions:
-    """Take some rows, with their thrust nodes."""
-    nodes = [solutions.nodes_of(place) for place in places]
-    return FacetSolutions(solutions.rows[places], np.concatenate([np.zeros((0, 3)), *nodes]).reshape(-1, 3))
-
-
-def replace_rows(solutions: FacetSolutions, places: Ints, better: FacetSolutions) -> FacetSolutions:
-    """Put the rows of ``better`` at ``places``, adding up the iterations."""
-    rows = solutions.rows.copy()
-    pieces = [solutions.nodes_of(row) for row in range(len(rows))]
-    for k, place in enumerate(places):
-        spent = rows[place]["iterations"]
-        rows[place] = better.rows[k]
-        rows[place]["iterations"] += spent
-        pieces[place] = better.nodes_of(k)
-    return FacetSolutions(rows, np.concatenate(pieces).reshape(-1, 3))
 
 
 def solve_facets(case: LandingCase, facets: NDArray[np.integer]) -> FacetSolutions:

@@ -1,4 +1,4 @@
-"""`reach run`, step by step: cases, solved facets, the section, summaries, the file."""
+"""`reach run`, step by step: cases, solved facets, the section or trace, summaries, the file."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from landing_cli import __version__
 from landing_cli.parallel import WorkPlan
+from landing_cli.reach import traced_work
 from landing_cli.reach.boundary import find_section, section_comparison, section_group, section_summary
 from landing_cli.reach.cases import landing_cases
 from landing_cli.reach.facet_work import (
@@ -28,6 +29,15 @@ from landing_cli.reach.recorded import solve_recorded
 from landing_cli.reach.records import FacetSolutions, LandingCase, Verdict, join
 from landing_cli.reach.stored import CaseResult, ReachRun, run_from_result, run_to_tree
 from landing_cli.reach.summary import summarise
+from landing_cli.reach.trace import Answers
+from landing_cli.reach.traced import (
+    answers_of,
+    find_trace,
+    trace_comparison,
+    trace_group,
+    trace_misses,
+    trace_summary,
+)
 from landing_cli.results.identity import RunIdentity
 from landing_cli.results.journal import Journal
 from landing_cli.results.output import finish_output, open_output
@@ -61,6 +71,23 @@ class Outcome:
     up_to_date: bool
 
 
+class Counter:
+    """Tells how many facets are done of those that were asked for so far."""
+
+    def __init__(self, progress: Callable[[int, int], None]) -> None:
+        self._progress = progress
+        self._done = self._total = 0
+
+    def expect(self, facets: int) -> None:
+        """More facets are asked for."""
+        self._total += facets
+
+    def __call__(self, facets: int) -> None:
+        """More facets are done."""
+        self._done += facets
+        self._progress(self._done, self._total)
+
+
 @dataclass(frozen=True)
 class Solver:
     """Solves facets of every case, recording each chunk."""
@@ -68,7 +95,7 @@ class Solver:
     prepared: tuple[PreparedCase, ...]
     journal: Journal
     plan: WorkPlan
-    told: Callable[[int], None]
+    progress: Counter
 
     @property
     def facets(self) -> int:
@@ -77,8 +104,16 @@ class Solver:
 
     def __call__(self, stage: str, items: NDArray[np.int64]) -> tuple[FacetSolutions, dict[int, str]]:
         """Solve items; see `facet_work` for what an item is."""
+        self.progress.expect(len(items))
         work = partial(solve_items, self.prepared, self.facets)
-        return solve_recorded(self.journal, stage, in_chunks(items), work, self.plan, self.told)
+        return solve_recorded(self.journal, stage, in_chunks(items), work, self.plan, self.progress)
+
+    def trace(self, stage: str, items: NDArray[np.int64]) -> tuple[FacetSolutions, dict[int, str]]:
+        """Solve items with their thrust margins."""
+        self.progress.expect(len(items))
+        work = partial(traced_work.solve_traced, self.prepared, self.facets)
+        chunks = in_chunks(items, traced_work.CHUNK_FACETS)
+        return solve_recorded(self.journal, stage, chunks, work, self.plan, self.progress, part_of_stage=True)
 
 
 def run(
@@ -167,17 +202,14 @@ def _solve(
 ) -> tuple[CaseResult, ...]:
     """Solve all cases by the scenario's method."""
     traverse = reach.method == "traverse" or options.compare
-    total = len(cases) * len(prepared[0].shared.centroids_m) if traverse else 0
-    done = 0
-
-    def told(more: int) -> None:
-        nonlocal done
-        done += more
-        progress(done, max(total, done))
-
-    solver = Solver(prepared, journal, options.plan, told)
+    solver = Solver(prepared, journal, options.plan, Counter(progress))
     results = _traverse(solver, cases) if traverse else ()
-    if reach.method == "section" or options.compare:
+    if reach.method == "trace":
+        results = tuple(
+            _trace(solver, index, name, case, results[index] if traverse else None)
+            for index, (name, case) in enumerate(cases)
+        )
+    elif reach.method == "section" or options.compare:
         results = tuple(
             _section(solver, reach, index, name, case, results[index] if traverse else None)
             for index, (name, case) in enumerate(cases)
@@ -225,3 +257,28 @@ def _section(
     solutions = join(asked)
     summary = {**summarise(mesh, solutions), "section": section}
     return CaseResult(case, name, solutions, summary, section_group(found), lost)
+
+
+def _trace(
+    solver: Solver, index: int, name: str, case: LandingCase, traversed: CaseResult | None
+) -> CaseResult:
+    """Find the domain of one case by its boundary; a traversal that ran tells what was missed."""
+    asked: list[FacetSolutions] = []
+    lost: dict[int, str] = {}
+
+    def ask(facets: NDArray[np.int64]) -> Answers:
+        solutions, missing = solver.trace(f"trace {case.name}", facets + index * solver.facets)
+        asked.append(of_case(solutions, index, solver.facets))
+        lost.update(lost_of_case(missing, index, solver.facets))
+        return answers_of(case, asked[-1])
+
+    found = find_trace(case, solver.prepared[index].shared, ask)
+    trace = trace_summary(case, found)
+    if traversed is not None:
+        trace |= trace_comparison(case, found, traversed.solutions)
+        boundary = trace_group(found, trace_misses(found, traversed.solutions))
+        summary = {**traversed.summary, "trace": trace}
+        return CaseResult(case, name, traversed.solutions, summary, boundary, traversed.lost)
+    solutions = join(asked)
+    summary = {**summarise(case.asteroid.mesh, solutions), "trace": trace}
+    return CaseResult(case, name, solutions, summary, trace_group(found, None), lost)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from landing_cli.errors import InputRefused
 from landing_cli.parallel import LostChunk, WorkPlan, run_chunks
-from landing_cli.reach.records import FacetSolutions, blank_rows, join
+from landing_cli.reach.records import FacetSolutions, blank_rows, join, take_rows
 from landing_cli.reach.stored import solutions_from_arrays, solutions_to_arrays
 from landing_cli.results.journal import Journal
 
@@ -24,6 +24,8 @@ def solve_recorded(
     solve: Callable[[Facets], FacetSolutions],
     plan: WorkPlan,
     progress: Callable[[int], None] | None = None,
+    *,
+    part_of_stage: bool = False,
 ) -> tuple[FacetSolutions, dict[int, str]]:
     """Solve facets in chunks, but take over those that the journal holds.
 
@@ -41,6 +43,9 @@ def solve_recorded(
         Where to solve.
     progress : callable, optional
         Told the number of facets that became known.
+    part_of_stage : bool
+        Whether the stage asks several times, so that its journal may hold more than these facets: where a
+        lost one is solved at last, later questions can be others than before.
 
     Returns
     -------
@@ -56,6 +61,9 @@ def solve_recorded(
     """
     tell = progress or (lambda facets: None)
     parts = [solutions_from_arrays(a) for key, a in journal.records.items() if key.startswith(f"{stage}/")]
+    if part_of_stage:
+        wanted = np.concatenate([np.zeros(0, np.int64), *chunks])
+        parts = [take_rows(part, np.flatnonzero(np.isin(part.rows["facet"], wanted))) for part in parts]
     known = np.concatenate([part.rows["facet"] for part in parts]) if parts else np.zeros(0, np.int64)
     asked = np.concatenate(chunks) if len(chunks) else known
     if len(np.unique(known)) != len(known) or not np.isin(known, asked).all():

@@ -169,10 +169,35 @@ def blank_rows(facets: NDArray[np.integer]) -> NDArray[np.void]:
 
 def join(parts: Sequence[FacetSolutions]) -> FacetSolutions:
     """Put parts together, rows in ascending facet order."""
-    rows = np.concatenate([p.rows for p in parts])
-    nodes = np.concatenate([p.thrust_nodes_n for p in parts]).reshape(-1, 3)
-    order = np.argsort(rows["facet"], kind="stable")
-    offsets = np.concatenate([[0], np.cumsum(rows["thrust_nodes"], dtype=np.int64)])
-    pieces = [nodes[offsets[i] : offsets[i + 1]] for i in order]
-    joined = np.concatenate(pieces) if pieces else nodes
-    return FacetSolutions(rows[order], joined.reshape(-1, 3))
+    # parts are mostly runs of facets: those in order need no second copy, which would be the largest in a run
+    ordered = sorted(parts, key=lambda p: int(p.rows["facet"][0]) if len(p.rows) else -1)
+    rows = np.concatenate([p.rows for p in ordered])
+    nodes = np.concatenate([p.thrust_nodes_n for p in ordered]).reshape(-1, 3)
+    if (np.diff(rows["facet"].astype(np.int64)) >= 0).all():
+        return FacetSolutions(rows, nodes)
+    return take_rows(FacetSolutions(rows, nodes), np.argsort(rows["facet"], kind="stable"))
+
+
+def take_rows(solutions: FacetSolutions, places: NDArray[np.int64]) -> FacetSolutions:
+    """Take some rows, with their thrust nodes, in the order of their places."""
+    offsets, rows = solutions.node_offsets, solutions.rows[places]
+    lengths = rows["thrust_nodes"].astype(np.int64)
+    # node k of a row that begins at b here and at a there comes from a + (k - b)
+    shift = np.repeat(offsets[places] - (np.cumsum(lengths) - lengths), lengths)
+    shift += np.arange(len(shift))
+    return FacetSolutions(rows, solutions.thrust_nodes_n[shift].reshape(-1, 3))
+
+
+def replace_rows(
+    solutions: FacetSolutions, places: NDArray[np.int64], better: FacetSolutions
+) -> FacetSolutions:
+    """Put the rows of ``better`` at ``places``, adding up the iterations."""
+    if len(places) == 0:
+        return solutions
+    source = np.arange(len(solutions.rows))
+    source[places] = len(solutions.rows) + np.arange(len(places))
+    rows = np.concatenate([solutions.rows, better.rows])
+    nodes = np.concatenate([solutions.thrust_nodes_n, better.thrust_nodes_n])
+    replaced = take_rows(FacetSolutions(rows, nodes), source)
+    replaced.rows["iterations"][places] += solutions.rows["iterations"][places]
+    return replaced

@@ -61,6 +61,8 @@ def check_case(result: CaseResult) -> None:
     _all_within("lost", np.array(list(result.lost), dtype=np.int64), facets)
     if result.boundary is not None:
         _check_boundary(result.boundary, facets)
+    if result.boundary is not None and ("loop" in result.boundary.members or "trace" in result.summary):
+        _check_trace(result, result.boundary)
     _check_printable("summary", result.summary)
     _check_summary(result.summary, summarise(case.asteroid.mesh, result.solutions))
 
@@ -104,6 +106,23 @@ def _check_boundary(boundary: Group, facets: int) -> None:
             raise ValueError("the domain does not tell of every facet")
         if member.data.dtype.kind in "iu":
             _all_within(f"boundary/{name}", member.data, facets)
+
+
+def _check_trace(result: CaseResult, boundary: Group) -> None:
+    """Loops that exist, edges between vertices that exist, and the counts that go with them."""
+    if not isinstance(result.summary.get("trace"), Mapping):
+        raise ValueError("summary/trace is missing")
+    along = ("loop", "reachable_facet", "unreachable_facet", "start_vertex", "end_vertex")
+    edges = {len(boundary.dataset(name).data) for name in along}
+    if len(edges) != 1:
+        raise ValueError("the lists of the boundary's edges differ in length")
+    _all_within("boundary/loop", boundary.dataset("loop").data, len(boundary.dataset("loop_closed").data))
+    for name in ("start_vertex", "end_vertex"):
+        _all_within(f"boundary/{name}", boundary.dataset(name).data, len(result.case.asteroid.mesh.vertices))
+    _all_within(
+        "boundary/seed_facets", boundary.dataset("seed_facets").data, len(result.case.asteroid.mesh.faces)
+    )
+    boundary.dataset("domain")
 
 
 def _check_summary(stored: Mapping[str, Any], known: Mapping[str, Any], path: str = "summary") -> None:

@@ -66,15 +66,15 @@ def write_all(descriptor: int, data: bytes | memoryview) -> None:
         left = left[os.write(descriptor, left) :]
 
 
-def replace_file(path: Path, data: bytes | memoryview) -> None:
+def replace_file(path: Path, *parts: bytes | memoryview) -> None:
     """Put a file in place whole, or not at all, and durably.
 
     Parameters
     ----------
     path : Path
         Where; what is there is replaced in one step.
-    data : bytes or memoryview
-        The new content.
+    *parts : bytes or memoryview
+        The new content, one after another.
 
     Raises
     ------
@@ -91,7 +91,8 @@ def replace_file(path: Path, data: bytes | memoryview) -> None:
         try:
             descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o666)
             try:
-                write_all(descriptor, data)
+                for part in parts:
+                    write_all(descriptor, part)
                 os.fsync(descriptor)
             finally:
                 os.close(descriptor)

@@ -133,8 +133,10 @@ class Reach(Section):
     terrain: Literal["report", "require"] = Field(
         "report", description="whether a path that cuts the mesh is a landing: report | require (it is not)"
     )
-    method: Literal["traverse", "section"] = Field(
-        "traverse", description="how the domain is found: traverse (every facet) | section (the paper's)"
+    method: Literal["traverse", "section", "trace"] = Field(
+        "traverse",
+        description="how the domain is found: traverse (every facet) | section (the paper's) | "
+        "trace (its boundary, by the margin)",
     )
     section: SectionMethod = Field(
         SectionMethod(),
@@ -142,8 +144,10 @@ class Reach(Section):
     )
 
     def model_post_init(self, context: Any, /) -> None:
-        """Refuse states without a name of their own or without a time, and times that contradict."""
+        """Refuse states without a name of their own or without a time, and choices that contradict."""
         self._check_names()
+        if self.method == "trace":
+            self._check_trace()
         if self.tof_s is not None:
             self._check_times(self.tof_s, "tof_s")
         for index, state in enumerate(self.initial_states):
@@ -167,6 +171,16 @@ class Reach(Section):
             for state in self.initial_states
             for tof_s in self.times_of(state)
         ]
+
+    def _check_trace(self) -> None:
+        """A trace follows the least thrust level: it must be what decides."""
+        for key, value, other in (("descent", self.descent, "free"), ("terrain", self.terrain, "report")):
+            if value != other:
+                raise wrong(
+                    "method",
+                    f"trace follows the least thrust level, which does not decide with {key}: {value}",
+                    f"take {key}: {other}, or method: traverse",
+                )
 
     def _check_names(self) -> None:
         first: dict[str, int] = {}

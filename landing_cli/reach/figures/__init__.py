@@ -63,6 +63,7 @@ def _maps(run: ReachRun, cases: tuple[CaseResult, ...], overview: bool) -> Itera
     from landing_cli.reach.figures.case_maps import delta_v_figure, verdict_figure
     from landing_cli.reach.figures.overview import overview_figure
     from landing_cli.reach.figures.parts import delta_v_scale
+    from landing_cli.reach.figures.traced import trace_figure
     from landing_cli.results.surface_map import map_surface
 
     surface, scale = map_surface(run.asteroid.mesh), delta_v_scale(run)
@@ -72,7 +73,9 @@ def _maps(run: ReachRun, cases: tuple[CaseResult, ...], overview: bool) -> Itera
         name = result.case.name
         yield f"{name}-verdict", verdict_figure(result, surface)
         yield f"{name}-delta-v", delta_v_figure(result, surface, scale)
-        if result.boundary is not None:
+        if result.boundary is not None and "trace" in result.summary:
+            yield f"{name}-boundary", trace_figure(result, result.boundary, surface)
+        elif result.boundary is not None:
             yield f"{name}-boundary", boundary_figure(result, result.boundary)
 
 

@@ -92,7 +92,7 @@ def write(
     fingerprint = digest(Group(tree.members, attributes))
     members = {**tree.members, PROVENANCE: Group({}, provenance)}
     image = build_image(Group(members, {**attributes, DIGEST: fingerprint}))
-    replace_file(path, b"".join([image, _seal(image)]))
+    replace_file(path, image, _seal(image))
     return fingerprint
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from io import BytesIO
 from math import ceil
 from typing import Any
 
@@ -34,16 +35,16 @@ def build_image(root: Group) -> bytes:
     bytes
         The same for the same tree.
     """
+    memory = BytesIO()  # HDF5's own in-memory driver would have to copy the whole file out
     access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
-    access.set_fapl_core(CHUNK_BYTES, False)
+    access.set_fileobj_driver(h5py.h5fd.fileobj_driver, memory)
     access.set_libver_bounds(h5py.h5f.LIBVER_V18, h5py.h5f.LIBVER_V18)
     creation = h5py.h5p.create(h5py.h5p.FILE_CREATE)
     creation.set_obj_track_times(False)
     identifier = h5py.h5f.create(b"memory", h5py.h5f.ACC_TRUNC, creation, access)
     with h5py.File(identifier) as file:
         _fill(file, root, {})
-        file.flush()
-        return identifier.get_file_image()
+    return memory.getvalue()
 
 
 def _fill(place: h5py.Group, group: Group, scales: Scales) -> None:
@@ -68,7 +69,10 @@ def _fill(place: h5py.Group, group: Group, scales: Scales) -> None:
 def _create(place: h5py.Group, name: str, dataset: Dataset) -> h5py.Dataset:
     data = _storable(dataset.data)
     # An empty array cannot be chunked, and has nothing to check.
-    options: dict[str, Any] = {"chunks": _chunk_shape(data), "fletcher32": True} if data.size else {}
+    # Each chunk is written once: a cache of them would only hold every dataset's until the file is closed.
+    options: dict[str, Any] = {}
+    if data.size:
+        options = {"chunks": _chunk_shape(data), "fletcher32": True, "rdcc_nbytes": 0}
     made = place.create_dataset(name, data=data, track_times=False, **options)
     _set_attribute(made, "units", dataset.units)
     _set_attribute(made, "description", dataset.description)
