@@ -25,7 +25,6 @@ from landing_cli.reach.free_flights import Question, best_flights, flights_near
 from landing_cli.reach.free_solve import CERTIFIED, CONVERGED, STALLED
 from landing_cli.reach.records import Binding, FacetSolutions, LandingCase, Verdict, blank_rows
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
-from landing_cli.reach.sides import with_proofs
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -340,7 +339,7 @@ def solve_prepared(prepared: PreparedCase, facets: NDArray[np.integer]) -> Facet
         finer = _solutions(prepared, work)
         better = np.flatnonzero(finer.rows[_COST] < solutions.rows[_COST][again])
         solutions = replace_rows(solutions, again[better], take_rows(finer, better))
-    return with_proofs(prepared, solutions)
+    return solutions
 
 
 def _saturated(work: Work) -> Ints:

@@ -39,8 +39,11 @@ INTERVALS = 20
 LEVEL = 1.0 - 1e-5
 # A relaxed flight that is nowhere deeper inside than this leaves nothing to branch on.
 CLEAR = 1.0 - 1e-3
+# A triangle is cut while a flight has less |xi| at its node; new nodes are so far from the old ones, unless
+# the flight is deeper inside near them by more than this.
+INSIDE, APART, SHALLOWER = 0.99, 2, 0.03
 # Covers and cuts that are tried for a facet, planes that a relaxation may have, iterations it may take.
-MOST_FAMILIES, MOST_PLANES, LIMIT = 16, 6, 30
+MOST_FAMILIES, MOST_PLANES, LIMIT = 40, 6, 30
 NEVER, MARGIN_WEIGHT = 1 << 30, 1e-3
 
 _SIGNS = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)], dtype=np.float64)
@@ -124,7 +127,9 @@ def bounds_around(prepared: PreparedCase, facets: Ints, levels: Floats) -> tuple
     iterations : (n,) int
         Solver iterations.
     """
-    scaled, shared = scale_case(prepared.case, INTERVALS)._replace(propellant=2.0), prepared.shared
+    shared = prepared.shared
+    # a handover on the ellipsoid is one outside it: its own row has no part in the bound
+    scaled = scale_case(prepared.case, INTERVALS)._replace(propellant=2.0, on_ellipsoid=False)
     relaxed = Relaxations(
         scaled,
         gravity_tube(scaled, shared.bounds),
@@ -137,7 +142,7 @@ def bounds_around(prepared: PreparedCase, facets: Ints, levels: Floats) -> tuple
     family = [Branch(place, (), ()) for place in open_]
     for _ in range(MOST_FAMILIES):
         solved = _solve(relaxed, family)
-        node, direction, depth = _deepest(scaled, solved.position)
+        node, direction, depth = _deepest(scaled, solved.position, family)
         stuck = (depth > CLEAR) | _hopeless(family, solved, levels)
         for k in np.argsort(-solved.level, kind="stable"):  # the likeliest to fail is looked at first
             place = family[k].place
@@ -248,16 +253,31 @@ def _solve(relaxed: Relaxations, family: list[Branch]) -> Batch:
     return out
 
 
-def _deepest(case: ScaledCase, position: Floats) -> tuple[Ints, Floats, Floats]:
-    """Node at which each path is deepest inside the ellipsoid, its direction in xi there, and |xi|."""
+def _deepest(case: ScaledCase, position: Floats, family: list[Branch]) -> tuple[Ints, Floats, Floats]:
+    """Node at which to branch for each path, its direction in xi there, and the least |xi| of the path.
+
+    A triangle that holds a flight well inside is cut first; a new node keeps its distance from the old ones,
+    where a flight cannot be far from where it was bound to pass.
+    """
     c, s = case.node_cos, case.node_sin
     x, y, z = np.moveaxis(position, 2, 0)
     xi = np.stack([c * x + s * y, c * y - s * x, z], axis=2) * case.inverse_axes
     level = np.linalg.norm(xi, axis=2)
     level[:, 0] = np.inf
-    if case.on_ellipsoid:
-        level[:, -1] = np.inf
-    node = np.argmin(np.where(np.isnan(level), np.inf, level), axis=1)
+    level[np.isnan(level)] = np.inf
+    node = np.array([_branching_node(*pair) for pair in zip(level, family, strict=True)], dtype=np.int64)
     every = np.arange(len(node))
-    depth = level[every, node]
-    return node, xi[every, node] / depth[:, None], depth
+    return node, xi[every, node] / level[every, node, None], level.min(axis=1)
+
+
+def _branching_node(level: Floats, branch: Branch) -> int:
+    old = np.array(branch.nodes, dtype=np.int64)
+    if len(old) == 0:
+        return int(np.argmin(level))
+    if level[old].min() < INSIDE:
+        return int(old[np.argmin(level[old])])
+    every = np.arange(len(level))
+    apart = np.where(np.abs(every[:, None] - old).min(axis=1) >= APART, level, np.inf)
+    if apart.min() < min(level.min() + SHALLOWER, CLEAR):
+        return int(np.argmin(apart))
+    return int(np.argmin(level))

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.reach.facet_work import solve_items
+from landing_cli.reach.facet_work import solve_without_proofs
 from landing_cli.reach.free_descent import PreparedCase, prepare
 from landing_cli.reach.margin import thrust_levels
 from landing_cli.reach.records import Binding, LandingCase, Verdict
@@ -101,16 +101,11 @@ def why_not(case: LandingCase, rows: NDArray[np.void]) -> WhyNot:
         changes.append(np.where(steps == 0, np.nan, steps * ladder.step))
     open_ = through_rock(case, shared)
     if open_ is not None:
-        rock = _solve(open_, facets)
+        rock = solve_without_proofs(open_, facets).rows
         reached = rock["verdict"] == Verdict.REACHABLE
         changes.append(np.where(reached, np.maximum(0.0, -rock["terrain_clearance_min_m"]), np.nan))
         searched.append(Searched(Kind.TERRAIN, 0.0, 0.0, np.inf, shared.mean_edge_m))
     return WhyNot(facets, tuple(searched), np.stack(changes, axis=1))
-
-
-def _solve(prepared: PreparedCase, facets: Ints) -> NDArray[np.void]:
-    """Rows of some facets, in their order."""
-    return solve_items((prepared,), len(prepared.shared.normals), facets).rows
 
 
 def _reached(ladder: Ladder, facets: Ints, steps: Ints) -> Flags:
@@ -118,7 +113,8 @@ def _reached(ladder: Ladder, facets: Ints, steps: Ints) -> Flags:
     reached = np.zeros(len(facets), dtype=np.bool_)
     for step in np.unique(steps):
         of = steps == step
-        reached[of] = _solve(ladder.at(int(step)), facets[of])["verdict"] == Verdict.REACHABLE
+        rows = solve_without_proofs(ladder.at(int(step)), facets[of]).rows
+        reached[of] = rows["verdict"] == Verdict.REACHABLE
     return reached
 
 
