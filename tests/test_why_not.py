@@ -126,7 +126,7 @@ def test_mirrored_facets_have_equal_relaxations() -> None:
     case = landing_case(body, position_m=np.array([0.0, 300.0, 600.0]), velocity_m_s=np.zeros(3), tof_s=760.0)
     centroids = facet_centroids(body.mesh)
     rows = solve_facets(case, np.arange(len(centroids))).rows
-    short = np.flatnonzero((rows["verdict"] == Verdict.UNREACHABLE) & (centroids[:, 0] > 20.0))[::12]
+    short = np.flatnonzero((rows["verdict"] == Verdict.UNREACHABLE) & (centroids[:, 0] > 20.0))[::6]
     mirror = np.array([-1.0, 1.0, 1.0])
     twins = [int(np.argmin(np.linalg.norm(centroids - mirror * centroids[k], axis=1))) for k in short]
     assert len(short) >= 3
