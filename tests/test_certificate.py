@@ -11,7 +11,12 @@ from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.optimize.conic_records import Model, new_model
 from landing_cli.reach.certificate import certified_thrust_level, gravity_bounds, gravity_tube
-from landing_cli.reach.descent_model import fill_arc_cones, fill_glide_cones, fill_handover_rows
+from landing_cli.reach.descent_model import (
+    fill_arc_cones,
+    fill_glide_cones,
+    fill_handover_rows,
+    new_cuts,
+)
 from landing_cli.reach.free_descent import PreparedCase, prepare, solve_prepared, survey
 from landing_cli.reach.free_flights import Question, best_flights
 from landing_cli.reach.free_solve import CONVERGED
@@ -72,6 +77,9 @@ class Bound:
             x[:6].copy(),
             x[6:].reshape(-1, 4).copy(),
             duals,
+            new_cuts(1),
+            0,
+            1.0,
         )
 
     @property
@@ -137,7 +145,17 @@ def test_any_duals_are_made_feasible() -> None:
     for _ in range(10):
         x, duals = rng.normal(size=bound.size), np.zeros((bound.cones, 4))
         certified_thrust_level(
-            bound.scaled, bound.target, bound.tube, bound.arc, bound.model, x[:6], x[6:].reshape(-1, 4), duals
+            bound.scaled,
+            bound.target,
+            bound.tube,
+            bound.arc,
+            bound.model,
+            x[:6],
+            x[6:].reshape(-1, 4),
+            duals,
+            new_cuts(1),
+            0,
+            1.0,
         )
         balance = np.einsum("jia,ji->a", bound.model.cone_map, duals) - bound.model.row_y[:6].T @ x[:6]
         np.testing.assert_allclose(balance[1:], 0.0, rtol=0, atol=1e-12)

@@ -254,11 +254,16 @@ def test_show_says_what_is_known_about_a_facet_and_why(
         "is unreachable (not proved): it needs 100.3 % of the thrust to pass around the ellipsoid",
     ]
     for facet, sentence in enumerate(sentences):
-        assert told_about(capsys, path, facet) == f"top_700s: facet {facet} {sentence}"
+        told = told_about(capsys, path, facet)
+        known_part, _, helps = told.partition("; it would be reachable with ")
+        assert known_part == f"top_700s: facet {facet} {sentence}"
+        assert bool(helps) == (facet > 1)
     assert main("landing", ["results", "show", str(path), "--facet", "2", "--json", "-q"]) == 0
     (case,) = json.loads(capsys.readouterr().out)["cases"]
     assert (case["case"], case["verdict"], case["binding"]) == ("top_700s", "unreachable", "thrust")
     assert case["delta_v_m_s"] is None
+    assert set(case["why_not"]) == {"thrust", "time", "glide_slope", "ellipsoid", "easiest"}
+    assert set(case["why_not"]["time"]) == {"change_s", "step_s", "searched_from_s", "searched_to_s"}
     assert case["handover_position_m"] == [None, None, None]
     assert main("landing", ["results", "show", str(path), "--facet", "4"]) == ExitCode.REFUSED
     assert "--facet 4: no such facet; take one of 0 to 3" in capsys.readouterr().err
@@ -269,4 +274,36 @@ def test_show_says_that_a_facet_is_unresolved(tmp_path: Path, capsys: pytest.Cap
         tmp_path / "a.h5", [YES, Verdict.UNRESOLVED, NO, NO], known={"violation": [0, 0.25, 1, 1]}
     )
     told = "unresolved: no search converged, the best attempt breaks a limit by 0.25 of its scale"
-    assert told_about(capsys, path, 1) == f"top_700s: facet 1 is {told}"
+    assert told_about(capsys, path, 1).startswith(f"top_700s: facet 1 is {told}; it would be reachable with ")
+
+
+def test_why_not_is_a_table_of_all_facets_that_are_not_reachable(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = stored_run(tmp_path / "a.h5", [YES, Verdict.UNRESOLVED, NO, NO])
+    command = ["results", "export", str(path), "--table", "why_not", "-q", "--jobs", "2"]
+    assert main("landing", [*command, "--format", "json", "--case", "top_700s"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["facet"] for row in rows] == [1, 2, 3]
+    assert [row["verdict"] for row in rows] == ["unresolved", "unreachable", "unreachable"]
+    assert {row["easiest"] for row in rows} <= {"thrust", "time", "glide_slope", "ellipsoid"}
+    for row in rows:
+        assert row["more_propellant_kg"] is None
+        assert row["depth_in_rock_m"] is None
+        assert row["searched_more_thrust_n"] == 40.0
+        assert row["searched_less_time_s"] == 375.0
+        assert row["more_thrust_n"] is None or 0.0 < row["more_thrust_n"] <= 40.0
+    assert main("landing", command) == 0
+    assert capsys.readouterr().out.splitlines()[0].startswith("case,facet,verdict,proved,binding,easiest,")
+    assert main("landing", [*command, "--format", "vtp"]) == ExitCode.USAGE
+    assert "a map of facets, not of a why_not" in capsys.readouterr().err
+
+
+def test_why_not_of_a_case_that_reaches_everything_is_an_empty_table(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = stored_run(tmp_path / "a.h5", [YES, YES, YES, YES])
+    command = ["results", "export", str(path), "--table", "why_not", "--case", "top_700s", "-q"]
+    assert main("landing", command) == 0
+    (header,) = capsys.readouterr().out.splitlines()
+    assert header.startswith("facet,verdict,proved,binding,easiest,more_thrust_n,")

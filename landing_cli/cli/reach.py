@@ -65,7 +65,7 @@ _VERIFICATION = (
 # where `landing results` finds stored, exports, figures and verify
 PACKAGE = "landing_cli.reach"
 # what `landing results export` writes of a run
-TABLES = ("facets", "boundary", "trajectory", "summary")
+TABLES = ("facets", "boundary", "trajectory", "summary", "why_not")
 HAS_FACETS = True
 
 app = new_program("Where on an asteroid the spacecraft can land.")
@@ -175,6 +175,8 @@ def print_run(run: ReachRun, path: Path, as_json: bool) -> None:
 def print_facet(cases: Sequence[CaseResult], facet: int, path: Path, as_json: bool) -> None:
     """Print what is known about one facet: a sentence a case, and its columns; vectors for a single case.
 
+    Where it is not reachable, what would make it so is searched for and told.
+
     Parameters
     ----------
     cases : sequence of CaseResult
@@ -187,13 +189,19 @@ def print_facet(cases: Sequence[CaseResult], facet: int, path: Path, as_json: bo
         Print JSON.
     """
     from landing_cli.reach.facet_story import facet_facts, tell_facet
+    from landing_cli.reach.relaxation_story import relaxation_facts, tell_relaxations
+    from landing_cli.reach.why_not_table import why_not_facet
 
     told = {result.case.name: tell_facet(result, facet) for result in cases}
     facts = [facet_facts(result, facet) for result in cases]
+    reasons = [why_not_facet(result, facet, guard.tell) for result in cases]
+    for result, why in zip(cases, reasons, strict=True):
+        if why is not None:
+            told[result.case.name] += f"; {tell_relaxations(result.case, why)}"
     if as_json:
         known = [
-            {"case": name, "told": sentence, **values}
-            for (name, sentence), values in zip(told.items(), facts, strict=True)
+            {"case": name, "told": sentence, **values, "why_not": why and relaxation_facts(why)}
+            for (name, sentence), values, why in zip(told.items(), facts, reasons, strict=True)
         ]
         console.print_json({"run": str(path), "facet": facet, "cases": known})
         return

@@ -45,6 +45,7 @@ class ExportedTable(StrEnum):
     FLYBYS = "flybys"
     LANDMARKS = "landmarks"
     VIEW = "view"
+    WHY_NOT = "why_not"
 
 
 class ExportFormat(StrEnum):
@@ -130,10 +131,15 @@ def export(
         typer.Option("--format", help="csv, json; ply, vtp, obj: a map of facets; oem: a trajectory."),
     ] = ExportFormat.CSV,
     output: Output = None,
+    jobs: Jobs = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a table, a map or a trajectory of a result for other programs; to stdout without -o."""
+    """Write a table, a map or a trajectory of a result for other programs; to stdout without -o.
+
+    The table why_not is searched for when it is asked for: the least change of each thing alone that would
+    make an unreachable facet reachable.
+    """
     if form is ExportFormat.PLY and output is None:
         raise UsageError("ply is binary", fix="name a file with -o")
     result = _read(run)
@@ -141,7 +147,10 @@ def export(
     _refuse_nonsense(result, chosen, form, facet)
     if output is not None:
         _refuse_existing(output, run, force)
-    data = _exported(result, chosen, form, case, facet)
+    if chosen is ExportedTable.WHY_NOT:
+        data = _why_not(result, form, case, jobs, console.Console(quiet))
+    else:
+        data = _exported(result, chosen, form, case, facet)
     if output is None:
         console.print_text(data.decode())
         return
@@ -284,6 +293,19 @@ def _exported(
     scenario = parse(result.identity.scenario, "the stored scenario").tree
     created = datetime.now(UTC).isoformat()
     return str(exports.export_oem(run, flown, scenario, created)).encode()
+
+
+def _why_not(
+    result: StoredResult, form: ExportFormat, case: str | None, jobs: int | None, voice: console.Console
+) -> bytes:
+    """Search for what would make facets reachable."""
+    from landing_cli.parallel import WorkPlan, pin_blas_threads
+
+    pin_blas_threads()
+    plan = WorkPlan(len(os.sched_getaffinity(0)) if jobs is None else jobs)
+    run, exports = _run_of(result), _module(result, "exports")
+    with voice.progress("facets") as progress:
+        return str(exports.export_why_not(run, form.value, case, plan, progress)).encode()
 
 
 def _read(path: Path) -> StoredResult:

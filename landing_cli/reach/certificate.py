@@ -10,7 +10,11 @@ sum_j A_j' z_j = A_y' lambda. Every feasible flight then satisfies, with s = 1 -
 where E holds the drift without gravity, gbar(t) bounds gravity wherever a flight with tau <= 1 can be at
 time t, and m, m_j are the least masses that tau <= 1 allows. A right-hand side that makes tau > 1
 therefore contradicts tau <= 1. |p + q s| is convex in t, so the trapezoid rule bounds its integral
-from above. The keep-out ellipsoid is left out: what it alone forbids is not proved here.
+from above.
+
+Of the keep-out ellipsoid it takes planes n . r(t_k) >= level at some nodes, each with a multiplier -eta <= 0:
+p + q s is then joined by -sum eta (t_k - t)+ n, still convex in size between nodes, and the work by the
+drift's. A bound with planes is one for the flights that keep to them; `sides` covers all flights so.
 """
 
 from __future__ import annotations
@@ -26,7 +30,7 @@ from landing_cli.body.gravity.bounds import largest_acceleration_outside
 from landing_cli.body.gravity.surface_bound import largest_acceleration_on_mesh
 from landing_cli.kernel import kernel
 from landing_cli.optimize.conic_records import Model, Point
-from landing_cli.reach.descent_model import Layout
+from landing_cli.reach.descent_model import Cuts, Layout
 from landing_cli.reach.scaled_case import ScaledCase, gravity_on_arc
 
 Floats = NDArray[np.float64]
@@ -83,19 +87,46 @@ def _drift_work(case: ScaledCase, target: Floats, q: Floats, p: Floats) -> float
 
 
 @kernel
-def _descent_integrals(case: ScaledCase, tube: Floats, q: Floats, p: Floats) -> tuple[float, float]:
-    """Upper bounds of int |p + q s| / m and int |p + q s| gbar by the trapezoid rule."""
+def _plane_work(
+    case: ScaledCase, multiplier: Floats, cuts: Cuts, planes: int, level: float, h: float
+) -> float:
+    """What the drift without gravity keeps of the planes, by their multipliers (never positive)."""
+    first, total = 7 if case.on_ellipsoid else 6, 0.0
+    for c in range(planes):
+        kept = -level
+        for i in range(3):
+            kept += cuts.normal[c, i] * (case.position[i] + cuts.node[c] * h * case.velocity[i])
+        total += min(multiplier[first + c], 0.0) * kept
+    return total
+
+
+@kernel
+def _descent_integrals(
+    case: ScaledCase, tube: Floats, multiplier: Floats, cuts: Cuts, planes: int
+) -> tuple[float, float]:
+    """Upper bounds of int |p + q s + ...| / m and int |p + q s + ...| gbar by the trapezoid rule."""
     n = tube.shape[0]
     h = 1.0 / n
-    last = math.sqrt((p[0] + q[0]) ** 2 + (p[1] + q[1]) ** 2 + (p[2] + q[2]) ** 2)
-    by_thrust = by_gravity = 0.0
-    for k in range(n):
-        s = 1.0 - (k + 1) * h
-        norm = math.sqrt((p[0] + s * q[0]) ** 2 + (p[1] + s * q[1]) ** 2 + (p[2] + s * q[2]) ** 2)
-        area = 0.5 * h * (last + norm)
-        mass = 1.0 - min(case.mass_flow * (k + 1) * h, case.propellant)
-        by_thrust += area / mass
-        by_gravity += area * tube[k]
+    first = 7 if case.on_ellipsoid else 6
+    by_thrust = by_gravity = last = 0.0
+    for k in range(n + 1):
+        s = 1.0 - k * h
+        x, y, z = (
+            multiplier[3] + s * multiplier[0],
+            multiplier[4] + s * multiplier[1],
+            multiplier[5] + s * multiplier[2],
+        )
+        for c in range(planes):
+            if cuts.node[c] > k:
+                lever = min(multiplier[first + c], 0.0) * (cuts.node[c] - k) * h
+                x += lever * cuts.normal[c, 0]
+                y += lever * cuts.normal[c, 1]
+                z += lever * cuts.normal[c, 2]
+        norm = math.sqrt(x * x + y * y + z * z)
+        if k > 0:
+            area = 0.5 * h * (last + norm)
+            by_thrust += area / (1.0 - min(case.mass_flow * k * h, case.propellant))
+            by_gravity += area * tube[k - 1]
         last = norm
     return by_thrust, by_gravity
 
@@ -148,8 +179,13 @@ def certified_thrust_level(
     multiplier: Floats,
     cone_dual: Floats,
     duals: Floats,
+    cuts: Cuts,
+    planes: int,
+    level: float,
 ) -> float:
     """Lower bound on the thrust level; above 1 it proves the facet unreachable.
+
+    With planes, it proves that of the flights that keep to all of them.
 
     Parameters
     ----------
@@ -164,11 +200,17 @@ def certified_thrust_level(
     model : Model
         Its matching rows' and cones' constant derivatives.
     multiplier : (R,) float
-        The first six are used; any values give a valid bound.
+        The first six are used, and those of the planes; any values give a valid bound.
     cone_dual : (J, 4) float
         Any values; projected to dual feasibility.
     duals : (J, 4) float
         Scratch space.
+    cuts : Cuts
+        Planes n . r >= level, each at one node.
+    planes : int
+        How many of them count; 0 for a bound on all flights.
+    level : float
+        What they keep.
 
     Returns
     -------
@@ -176,8 +218,9 @@ def certified_thrust_level(
     """
     q, p = multiplier[0:3], multiplier[3:6]
     _dual_feasible(case, model, multiplier, q.shape[0] + p.shape[0], cone_dual, duals)
-    by_thrust, by_gravity = _descent_integrals(case, tube, q, p)
+    by_thrust, by_gravity = _descent_integrals(case, tube, multiplier, cuts, planes)
     work = _drift_work(case, target, q, p) - by_gravity
+    work += _plane_work(case, multiplier, cuts, planes, level, 1.0 / tube.shape[0])
     W2 = case.spin * case.spin
     for j in range(case.arc_fractions.shape[0]):
         z = duals[j]

@@ -8,6 +8,7 @@ import numpy as np
 
 from landing_cli.errors import InputRefused
 from landing_cli.flight.trajectory import Trajectory
+from landing_cli.parallel import WorkPlan
 from landing_cli.reach.flown import flown_trajectory
 from landing_cli.reach.records import FACET_COLUMNS
 from landing_cli.reach.stored import CaseResult, ReachRun
@@ -169,6 +170,35 @@ def export_table(
     else:
         raise InputRefused(f"no table '{table}'", where="--table", fix="take facets, boundary or summary")
     return TEXT_FORMATS[form](laid)
+
+
+def export_why_not(
+    run: ReachRun, form: str, case: str | None, plan: WorkPlan, progress: Callable[[int, int], None]
+) -> str:
+    """Find and write what would make every facet reachable that is not.
+
+    Parameters
+    ----------
+    run : ReachRun
+        The run.
+    form : {"csv", "json"}
+        How.
+    case : str or None
+        One case only; otherwise all below each other, with their name as first column.
+    plan : WorkPlan
+        Where to search.
+    progress : callable
+        Told (searched, total) facets.
+
+    Raises
+    ------
+    InputRefused
+        If there is no such case.
+    """
+    from landing_cli.reach.why_not_table import why_not_tables
+
+    tables = why_not_tables(chosen_cases(run, case), plan, progress)
+    return TEXT_FORMATS[form](stacked(tables) if case is None else next(iter(tables.values())))
 
 
 def export_map(run: ReachRun, form: str, case: str | None = None) -> bytes:

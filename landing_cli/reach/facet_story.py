@@ -87,7 +87,10 @@ def _obstacle(result: CaseResult, row: Row) -> str:
         return "every flight that was found cuts rock on the way"
     if result.case.descent == "extremal" and not row["proved"]:
         return f"no extremal meets every limit{_attempt(row)}; what stops it: {_WORDS[binding]}"
-    around = " to pass around the ellipsoid" if binding is Binding.ELLIPSOID else ""
+    around = {
+        Binding.ELLIPSOID: " to pass around the ellipsoid",
+        Binding.GLIDE_SLOPE: " to stay inside the glide slope",
+    }.get(binding, "")
     least = "" if np.isfinite(row["thrust_margin"]) else "at least "
     return f"it needs {least}{100.0 * (1.0 + violation):.4g} % of the thrust{around}"
 

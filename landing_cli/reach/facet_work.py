@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from landing_cli.reach.free_descent import PreparedCase, solve_prepared
 from landing_cli.reach.records import FacetSolutions, join
+from landing_cli.reach.sides import with_proofs
 
 Items = NDArray[np.int64]
 
@@ -52,7 +53,28 @@ def solve_items(prepared: tuple[PreparedCase, ...], facets: int, items: Items) -
 
 
 def _solve(prepared: PreparedCase, facets: Items) -> FacetSolutions:
-    free = solve_prepared(prepared, facets)
+    return _by_descent(prepared, with_proofs(prepared, solve_prepared(prepared, facets)))
+
+
+def solve_without_proofs(prepared: PreparedCase, facets: Items) -> FacetSolutions:
+    """Solve facets of one case, and prove no more of them unreachable than comes for free.
+
+    Parameters
+    ----------
+    prepared : PreparedCase
+        The case.
+    facets : (k,) int
+        Which facets.
+
+    Returns
+    -------
+    FacetSolutions
+        In the order given.
+    """
+    return _by_descent(prepared, solve_prepared(prepared, facets))
+
+
+def _by_descent(prepared: PreparedCase, free: FacetSolutions) -> FacetSolutions:
     if prepared.case.descent == "free":
         return free
     from landing_cli.reach.extremal_descent import solve_from

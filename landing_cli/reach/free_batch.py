@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from landing_cli.kernel import kernel
 from landing_cli.kernel_record import by_reference
 from landing_cli.reach.descent_model import Layout, layout
-from landing_cli.reach.free_solve import CONVERGED, Solver, solve
+from landing_cli.reach.free_solve import CERTIFIED, CONVERGED, Solver, solve
 from landing_cli.reach.records import Binding
 from landing_cli.reach.scaled_case import ScaledCase
 from landing_cli.reach.shooting import pull_back
@@ -144,6 +144,7 @@ def solve_many(
     limit: int,
     tube: Floats,
     arc_bound: float,
+    prove: bool,
     solver: Solver,
     out: Batch,
 ) -> None:
@@ -169,6 +170,8 @@ def solve_many(
         Most iterations a facet.
     tube, arc_bound : (N,) float, float
         Bounds of gravity for the certificate.
+    prove : bool
+        Bound the thrust level of the flights that keep to the planes; see :func:`free_solve.solve`.
     solver : Solver
         Work space for the case.
     out : Batch
@@ -181,7 +184,9 @@ def solve_many(
             for a in range(3):
                 solver.cuts.normal[c, a] = cuts.normal[i, c, a]
         plan = layout(case, count, energy_weight, tau_free, keep_level[i])
-        outcome = solve(case, targets[i], normals[i], plan, retake_from, tube, arc_bound, limit, solver)
+        outcome = solve(
+            case, targets[i], normals[i], plan, retake_from, tube, arc_bound, limit, prove, solver
+        )
         out.status[i], out.iterations[i] = outcome.status, outcome.iterations
         out.energy[i], out.level[i], out.bound[i] = outcome.energy, solver.point.y[0], outcome.bound
         for k in range(out.thrust.shape[1]):
@@ -195,4 +200,5 @@ def solve_many(
                 cuts.normal[i, c, a] = solver.cuts.normal[c, a]
         if outcome.status == CONVERGED:
             keep_costates(case, plan, solver, outcome.mass_costate, out.costates[i])
+        if outcome.status == CONVERGED or outcome.status == CERTIFIED:
             keep_pressure(case, plan, solver, out.pressure[i])

@@ -140,7 +140,7 @@ def _by_energy(prepared: PreparedCase, work: Work, chosen: Ints) -> None:
     certified = chosen[flights.status == CERTIFIED]
     rows["verdict"][certified] = Verdict.UNREACHABLE
     rows["proved"][certified] = 1
-    rows["binding"][certified] = Binding.THRUST
+    rows["binding"][certified] = _stopping(flights.pressure[flights.status == CERTIFIED])
     rows["violation"][certified] = flights.bound[flights.status == CERTIFIED] - 1.0
     # a free flight that dips into the ellipsoid meets the thrust bound: what stops it is the ellipsoid
     rows["binding"][chosen[around]] = Binding.ELLIPSOID
@@ -182,7 +182,7 @@ def _by_margin(prepared: PreparedCase, work: Work, chosen: Ints) -> None:
     rows["proved"][chosen[short]] = flights.bound[short] > 1.0
     rows["violation"][chosen[short]] = flights.level[short] - 1.0
     by_ellipsoid = short & (around | (rows["binding"][chosen] == Binding.ELLIPSOID)) & (flights.bound <= 1.0)
-    rows["binding"][chosen[short]] = Binding.THRUST
+    rows["binding"][chosen[short]] = _stopping(flights.pressure[short])
     rows["binding"][chosen[by_ellipsoid]] = Binding.ELLIPSOID
     flights.status[short] = STALLED
     _deliver(prepared, work, chosen, flights)
@@ -287,6 +287,15 @@ def _binding(pressure: Floats, energy: Floats) -> Ints:
     strongest = np.argmax(pressure, axis=1)
     largest = np.take_along_axis(pressure, strongest[:, None], 1)[:, 0]
     return np.where(largest <= SLIGHT_PRESSURE * energy, int(Binding.NONE), strongest + 1)
+
+
+def _stopping(pressure: Floats) -> Ints:
+    """What stops flights that the ellipsoid does not: the glide slope where it weighs more than the thrust.
+
+    By its pressure, widening the slope by some share then gains more than as large a share of thrust.
+    """
+    by_slope = pressure[:, Binding.GLIDE_SLOPE - 1] > pressure[:, Binding.THRUST - 1]
+    return np.where(by_slope, int(Binding.GLIDE_SLOPE), int(Binding.THRUST))
 
 
 def _solutions(prepared: PreparedCase, work: Work) -> FacetSolutions:

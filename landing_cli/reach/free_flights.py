@@ -186,6 +186,7 @@ def _solve(question: Question, cuts: CutBatch, level: Floats, retake_from: int, 
         limit,
         question.tube,
         question.arc_bound,
+        False,
         new_solver(question.case),
         out,
     )

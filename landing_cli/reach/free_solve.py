@@ -149,6 +149,33 @@ def cold_start(case: ScaledCase, target: Floats, normal: Floats, plan: Layout, s
         point.cone_dual[j, 0] = 0.1 * scale
 
 
+@kernel
+def _certificate(
+    case: ScaledCase,
+    target: Floats,
+    tube: Floats,
+    arc_bound: float,
+    plan: Layout,
+    planes: int,
+    solver: Solver,
+) -> float:
+    """Bound the thrust level by the current multipliers."""
+    point = solver.point
+    return certified_thrust_level(
+        case,
+        target,
+        tube,
+        arc_bound,
+        solver.model,
+        point.multiplier,
+        point.cone_dual,
+        solver.duals,
+        solver.cuts,
+        planes,
+        plan.level,
+    )
+
+
 @inlined
 def solve(
     case: ScaledCase,
@@ -159,6 +186,7 @@ def solve(
     tube: Floats,
     arc_bound: float,
     limit: int,
+    prove: bool,
     solver: Solver,
 ) -> Outcome:
     """Solve one facet from a cold start.
@@ -177,6 +205,9 @@ def solve(
         Bounds of gravity for the certificate.
     limit : int
         Most iterations.
+    prove : bool
+        Bound the thrust level of the flights that keep to the planes, not of all flights, and stop as soon
+        as that is above 1.
     solver : Solver
         Its cuts are given; its point holds the answer.
 
@@ -188,6 +219,7 @@ def solve(
     point, model, step, path = solver.point, solver.model, solver.step, solver.path
     cold_start(case, target, normal, plan, solver)
     scale = 1.0 if plan.tau_free else plan.energy_weight
+    planes = plan.n_cuts if prove else 0
     status, bound, energy, mass_costate = STALLED, 0.0, 0.0, 0.0
     iteration = 0
     while iteration < limit:
@@ -207,18 +239,14 @@ def solve(
         ):
             status = CONVERGED
             break
-        if not plan.tau_free and iteration >= FIRST_CERTIFICATE:
-            bound = max(
-                bound,
-                certified_thrust_level(
-                    case, target, tube, arc_bound, model, point.multiplier, point.cone_dual, solver.duals
-                ),
-            )
+        if (prove or not plan.tau_free) and iteration >= FIRST_CERTIFICATE:
+            bound = max(bound, _certificate(case, target, tube, arc_bound, plan, planes, solver))
             if bound > 1.0:
                 status = CERTIFIED
                 break
             if (
-                iteration >= FIRST_BLOCKED
+                not plan.tau_free
+                and iteration >= FIRST_BLOCKED
                 and linearised_thrust_level(case, plan, point, model, solver.duals) > BLOCKED_LEVEL
             ):
                 status = BLOCKED
@@ -228,7 +256,5 @@ def solve(
         smallest = 0.1 * TOLERANCE * scale / (point.thrust.shape[0] + plan.n_cones + plan.n_rows)
         advance(point, model, step, plan.n_equal, plan.n_rows, plan.n_cones, gap, smallest, plan.tau_free)
     if plan.tau_free and status == CONVERGED:
-        bound = certified_thrust_level(
-            case, target, tube, arc_bound, model, point.multiplier, point.cone_dual, solver.duals
-        )
+        bound = max(bound, _certificate(case, target, tube, arc_bound, plan, planes, solver))
     return Outcome(status, iteration, energy, bound, mass_costate)

@@ -90,9 +90,8 @@ def _certificates(prepared: PreparedCase) -> None:
     solver, case, target = _solver(prepared), prepared.coarse, prepared.shared.normals[0]
     point, model = solver.point, solver.model
     linearised_thrust_level(case, layout(case, 0, 1.0, False, 1.0), point, model, solver.duals)
-    certified_thrust_level(
-        case, target, prepared.coarse_tube, 1.0, model, point.multiplier, point.cone_dual, solver.duals
-    )
+    multipliers = point.multiplier, point.cone_dual, solver.duals
+    certified_thrust_level(case, target, prepared.coarse_tube, 1.0, model, *multipliers, solver.cuts, 0, 1.0)
 
 
 def _answers(prepared: PreparedCase) -> None:
