@@ -15,20 +15,21 @@ class IsochroneSection(Section):
     """When each facet is reachable: `reach isochrone`."""
 
     tof_min_s: Auto | Annotated[Seconds, Tag("value")] = Field(
-        "auto",
+        default="auto",
         discriminator=Discriminator(word_or_value),
         description="shortest time of flight, s, or auto: of a crossing at full thrust to the nearest facet",
     )
     tof_max_s: Auto | Annotated[Seconds, Tag("value")] = Field(
-        "auto",
+        default="auto",
         discriminator=Discriminator(word_or_value),
         description="longest time of flight, s, or auto: the longest of reach",
     )
     step_s: Seconds = Field(
-        25.0, description="step between times at which every facet is asked, s; a shorter gap may be missed"
+        default=25.0,
+        description="step between times at which every facet is asked, s; a shorter gap may be missed",
     )
     tolerance_s: Seconds = Field(
-        0.5, description="how closely the ends of each facet's intervals are found, s"
+        default=0.5, description="how closely the ends of each facet's intervals are found, s"
     )
 
     def model_post_init(self, context: Any, /) -> None:

@@ -32,31 +32,13 @@ class Brackets(NamedTuple):
 
     def taken(self, chosen: NDArray[np.bool_]) -> Brackets:
         """Return some of them."""
-        return Brackets(*(column[chosen] for column in self))
-
-
-def first_brackets(verdicts: Verdicts, on_grid: IntArray) -> Brackets:
-    """Find the steps of the grid in which a verdict changes.
-
-    Parameters
-    ----------
-    verdicts : (s, k, m) uint8
-        By state, time of the grid and facet.
-    on_grid : (k,) int
-        The places of the grid's times.
-
-    Returns
-    -------
-    Brackets
-    """
-    state, step, facet = np.nonzero(verdicts[:, 1:] != verdicts[:, :-1])
-    return Brackets(
-        state.astype(np.int64) * verdicts.shape[2] + facet,
-        on_grid[step],
-        on_grid[step + 1],
-        verdicts[state, step, facet],
-        verdicts[state, step + 1, facet],
-    )
+        return Brackets(
+            self.series[chosen],
+            self.low[chosen],
+            self.high[chosen],
+            self.before[chosen],
+            self.after[chosen],
+        )
 
 
 def wide(brackets: Brackets) -> NDArray[np.bool_]:
@@ -86,5 +68,11 @@ def halves(brackets: Brackets, middle: Verdicts) -> Brackets:
     at = middles(brackets)
     lower = brackets._replace(high=at, after=middle)
     upper = brackets._replace(low=at, before=middle)
-    both = Brackets(*(np.concatenate(pair) for pair in zip(lower, upper, strict=True)))
+    both = Brackets(
+        np.concatenate([lower.series, upper.series]),
+        np.concatenate([lower.low, upper.low]),
+        np.concatenate([lower.high, upper.high]),
+        np.concatenate([lower.before, upper.before]),
+        np.concatenate([lower.after, upper.after]),
+    )
     return both.taken(both.before != both.after)

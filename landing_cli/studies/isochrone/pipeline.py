@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from landing_cli import __version__
 from landing_cli.parallel import WorkPlan
 from landing_cli.reach.cases import landing_cases
-from landing_cli.reach.facet_work import CHUNK_FACETS
+from landing_cli.reach.facet_work import CHUNK_FACETS, in_chunks
 from landing_cli.reach.free_descent import survey
 from landing_cli.reach.kernels import are_compiled, compile_parts
 from landing_cli.reach.records import LandingCase
@@ -27,7 +27,6 @@ from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.schema import Reach
 from landing_cli.scenario.sections import for_mission, isochrone_section, reach_section
 from landing_cli.scenario.show import to_yaml
-from landing_cli.studies.isochrone.halving import first_brackets, halves, middles, wide
 from landing_cli.studies.isochrone.intervals import facet_numbers, intervals_of
 from landing_cli.studies.isochrone.recorded import solve_recorded
 from landing_cli.studies.isochrone.records import (
@@ -41,11 +40,20 @@ from landing_cli.studies.isochrone.records import (
 from landing_cli.studies.isochrone.stored import MISSION, run_from_result, run_to_tree
 from landing_cli.studies.isochrone.summary import summarise
 from landing_cli.studies.isochrone.time_grid import TimeGrid, time_grid
-from landing_cli.studies.isochrone.work import Items, Study, solve_items
+from landing_cli.studies.isochrone.work import (
+    Items,
+    Study,
+    blank_samples,
+    changes_of,
+    halve_changes,
+    solve_items,
+    step_of,
+)
 
 COMMAND = "reach isochrone"
 COMPILING = "compiling the kernels (once after an installation)"
 COMPILING_FACETS = 8
+ITEM_DTYPE = np.dtype([("item", "i8")])
 
 
 @dataclass(frozen=True)
@@ -63,22 +71,6 @@ class Outcome:
 
     run: IsochroneRun
     up_to_date: bool
-
-
-@dataclass(frozen=True)
-class Solver:
-    """Solves items of a study, recording each chunk."""
-
-    study: Study
-    journal: Journal
-    plan: WorkPlan
-    told: Callable[[int], None]
-
-    def __call__(self, stage: str, items: Items) -> tuple[Rows, dict[int, str]]:
-        """Solve items; see `work` for what an item is."""
-        return solve_recorded(
-            self.journal, stage, items, partial(solve_items, self.study), self.plan, self.told
-        )
 
 
 def states_of(reach: Reach, built: Built) -> tuple[LandingCase, ...]:
@@ -184,44 +176,42 @@ def _solve(
         done += more
         progress(done, max(total, done))
 
-    solver = Solver(study, journal, plan, told)
-    samples, lost = solver("grid", study.grid_items)
-    states, times, facets = len(study.cases), len(study.grid.tof_s), study.facets
-    by_grid = samples.reshape(states, times, facets)
-    brackets = first_brackets(by_grid["verdict"], study.grid.on_grid)
-    rounds = [samples[["item", "verdict"]]]
-    for number in range(1, study.grid.halvings + 1):
-        # where a question was lost, what it would have led to is asked once it is answered
-        brackets = brackets.taken(wide(brackets) & ~np.isin(brackets.series, _series(study, lost)))
-        total = done + len(brackets.series) * (study.grid.halvings + 1 - number)
-        items = _items(study, brackets.series, middles(brackets))
-        order = np.argsort(items)
-        answers, gone = solver(f"halving {number}", items[order])
-        verdicts = np.empty(len(items), dtype=np.uint8)
-        verdicts[order] = answers["verdict"]
-        brackets = halves(brackets, verdicts)
-        rounds.append(answers[["item", "verdict"]])
+    chunks = [items.view(ITEM_DTYPE) for items in in_chunks(study.grid_items)]
+    samples, lost = solve_recorded(journal, "grid", chunks, partial(_ask, study), _itself, plan, told)
+    samples = np.concatenate([samples, blank_samples(np.array(list(lost), dtype=np.int64))])
+    samples = samples[np.argsort(samples["item"])]
+    ends = samples[:0]
+    if study.grid.halvings:
+        # where an answer was lost, what it leads to is asked once it is there
+        changes = [chunk[~_touched(study, chunk, lost)] for chunk in changes_of(study, samples)]
+        total = done + study.grid.halvings * sum(map(len, changes))
+        halve, owners = partial(halve_changes, study), partial(step_of, study)
+        ends, gone = solve_recorded(journal, "ends", changes, halve, owners, plan, told)
         lost |= gone
-    every = np.concatenate([np.asarray(part) for part in rounds])
     return IsochroneRun(
-        tuple(_state_result(study, index, by_grid[index], every, lost) for index in range(states))
+        tuple(_state_result(study, index, samples, ends, lost) for index in range(len(study.cases)))
     )
 
 
-def _items(study: Study, series: NDArray[np.int64], place: NDArray[np.int64]) -> Items:
-    state, facet = np.divmod(series, study.facets)
-    return study.items(state, place, facet)
+def _ask(study: Study, questions: Rows) -> Rows:
+    return solve_items(study, questions["item"])
 
 
-def _series(study: Study, lost: dict[int, str]) -> NDArray[np.int64]:
-    """Facets of states, as `halving` counts them, of which a question was lost."""
-    state, _, facet = study.parted(np.array(list(lost), dtype=np.int64))
-    return state * study.facets + facet
+def _itself(items: Items) -> Items:
+    return items
 
 
-def _state_result(study: Study, index: int, by_grid: Rows, every: Rows, lost: dict[int, str]) -> StateResult:
+def _touched(study: Study, changes: Rows, lost: dict[int, str]) -> NDArray[np.bool_]:
+    """Which steps begin or end with a lost answer."""
+    begin = changes["item"]
+    return np.isin(begin, list(lost)) | np.isin(begin + study.grid.parts * study.facets, list(lost))
+
+
+def _state_result(study: Study, index: int, samples: Rows, ends: Rows, lost: dict[int, str]) -> StateResult:
     """Put together what was found for one initial state."""
     case, grid = study.cases[index], study.grid
+    by_grid = samples.reshape(-1, len(grid.tof_s), study.facets)[index]
+    every = np.concatenate([samples, ends])
     state, place, facet = study.parted(every["item"])
     own = state == index
     answers = GridAnswers(
@@ -242,9 +232,8 @@ def _state_result(study: Study, index: int, by_grid: Rows, every: Rows, lost: di
 
 def _lost_of(study: Study, index: int, lost: dict[int, str]) -> tuple[Lost, ...]:
     """The questions of one initial state that could not be answered."""
-    found = []
-    for item in sorted(lost):
-        state, place, facet = (int(part) for part in study.parted(np.array([item]))[:3])
-        if state == index:
-            found.append(Lost(facet, float(study.grid.times_s(place)), lost[item]))
-    return tuple(found)
+    items = np.array(sorted(lost), dtype=np.int64)  # of a step, its beginning
+    state, place, facet = study.parted(items)
+    tof_s = study.grid.times_s(place)
+    own = np.flatnonzero(state == index).tolist()
+    return tuple(Lost(int(facet[k]), float(tof_s[k]), lost[int(items[k])]) for k in own)

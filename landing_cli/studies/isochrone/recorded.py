@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from typing import Any
 
@@ -11,44 +11,48 @@ from numpy.typing import NDArray
 
 from landing_cli.errors import InputRefused
 from landing_cli.parallel import LostChunk, WorkPlan, run_chunks
-from landing_cli.reach.facet_work import in_chunks
 from landing_cli.reach.records import Verdict
 from landing_cli.results.journal import Journal
 from landing_cli.studies.isochrone.records import SAMPLE_DTYPE, Rows
-from landing_cli.studies.isochrone.work import Items, blank_samples
+
+Items = NDArray[np.int64]
 
 
 def solve_recorded(
     journal: Journal,
     stage: str,
-    items: Items,
-    solve: Callable[[Items], Rows],
+    chunks: Sequence[Rows],
+    solve: Callable[[Rows], Rows],
+    owners: Callable[[Items], Items],
     plan: WorkPlan,
     told: Callable[[int], None],
 ) -> tuple[Rows, dict[int, str]]:
-    """Solve items in chunks, but take over those that the journal holds.
+    """Solve questions in chunks, but take over those that the journal holds.
 
     Parameters
     ----------
     journal : Journal
         Open; every chunk is recorded in it before the next is awaited.
     stage : str
-        Names this round in the journal.
-    items : (n,) int
-        What to solve, ascending.
+        Names this part of the run in the journal.
+    chunks : sequence of structured arrays with a field ``item``
+        What to ask, each item once.
     solve : callable
-        Solves some items, picklable; an item's answer depends on nothing but the item.
+        Answers some questions by one or more samples, picklable; what it finds for a question depends on
+        nothing but the question.
+    owners : callable
+        Tells the question that a sample belongs to, by their items.
     plan : WorkPlan
         Where to solve.
     told : callable
-        Told the number of items that became known.
+        Told the number of samples that became known.
 
     Returns
     -------
-    (n,) structured array of SAMPLE_DTYPE
-        Ascending; unresolved where an item was lost.
+    structured array of SAMPLE_DTYPE
+        Ascending; none of questions that were lost.
     dict of int to str
-        The lost items and why. They are not recorded, so that the next run tries them again.
+        The items of lost questions and why. They are not recorded, so that the next run tries them again.
 
     Raises
     ------
@@ -56,24 +60,24 @@ def solve_recorded(
         If the journal holds what this run cannot have recorded.
     """
     parts = [_decoded(a, journal) for key, a in journal.records.items() if key.startswith(f"{stage}/")]
-    known = np.concatenate([part["item"] for part in parts]) if parts else np.zeros(0, dtype=np.int64)
-    if len(np.unique(known)) != len(known) or not np.isin(known, items).all():
-        raise _unfit(journal, "holds items that this run never asks for, or one of them twice")
+    known = np.concatenate([np.zeros(0, dtype=np.int64), *(part["item"] for part in parts)])
+    asked = np.concatenate([known[:0], *(chunk["item"] for chunk in chunks)])
+    answered = owners(known)
+    if len(np.unique(known)) != len(known) or not np.isin(answered, asked).all():
+        raise _unfit(journal, "holds questions that this run never asks, or one of them twice")
     told(len(known))
-    left = in_chunks(items[~np.isin(items, known)])
+    left = [chunk[~np.isin(chunk["item"], answered)] for chunk in chunks]
     lost: dict[int, str] = {}
-    with closing(run_chunks(solve, left, plan)) as answers:
+    with closing(run_chunks(solve, [chunk for chunk in left if len(chunk)], plan)) as answers:
         for _, answer in answers:
             if isinstance(answer, LostChunk):
-                gone = np.asarray(answer.items)
-                lost |= dict.fromkeys(gone.tolist(), answer.reason)
-                answer = blank_samples(gone)
-            else:
-                journal.append(f"{stage}/{answer['item'][0]}", {"samples": answer})
+                lost |= dict.fromkeys(answer.items["item"].tolist(), answer.reason)
+                continue
+            journal.append(f"{stage}/{answer['item'][0]}", {"samples": answer})
             parts.append(answer)
             told(len(answer))
     rows = np.concatenate([np.zeros(0, dtype=SAMPLE_DTYPE), *parts])
-    return rows[np.argsort(rows["item"], kind="stable")], lost
+    return rows[np.argsort(rows["item"])], lost
 
 
 def _decoded(arrays: Mapping[str, NDArray[Any]], journal: Journal) -> Rows:

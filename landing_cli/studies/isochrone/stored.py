@@ -144,7 +144,7 @@ def _lost_to_group(lost: tuple[Lost, ...]) -> Group:
     return Group(
         {
             "facet": Dataset(facets, "1", "facets of questions that could not be answered", ("question",)),
-            "tof_s": Dataset(times, "s", "at which time of flight", ("question",)),
+            "tof_s": Dataset(times, "s", "at which time of flight, or in the step from it", ("question",)),
             "reason": Dataset(reasons, "1", "why", ("question",)),
         }
     )

@@ -2,7 +2,8 @@
 
 An item is one facet at one place of the ladder from one initial state, written as one integer, so that a
 chunk of work is an array that can be cut anywhere. A chunk in ascending order holds the facets of a case
-together: each case is prepared once a chunk, which costs as much as one or two facets.
+together: each case is prepared once a chunk, which costs as much as one or two facets. The facets whose
+verdict changes in the same step are halved in one chunk, where they share the cases of the first halvings.
 """
 
 from __future__ import annotations
@@ -15,10 +16,15 @@ from numpy.typing import NDArray
 from landing_cli.reach.facet_work import solve_items as solve_facets
 from landing_cli.reach.free_descent import Surroundings, prepare
 from landing_cli.reach.records import FacetSolutions, LandingCase
+from landing_cli.studies.isochrone.halving import Brackets, halves, middles, wide
 from landing_cli.studies.isochrone.records import SAMPLE_DTYPE, Rows
 from landing_cli.studies.isochrone.time_grid import TimeGrid
 
 Items = NDArray[np.int64]
+
+# A change of verdict to look into: the item at the beginning of its step, and the verdicts at both ends.
+CHANGE_DTYPE = np.dtype([("item", "i8"), ("before", "u1"), ("after", "u1")])
+CHUNK_CHANGES = 64
 
 _TAKEN = ("verdict", "proved", "performance_index_m2_s3", "delta_v_m_s")
 
@@ -118,6 +124,70 @@ def solve_items(study: Study, items: Items) -> Rows:
         for name in _TAKEN:
             rows[name][begin:end] = solved[name]
     return rows
+
+
+def step_of(study: Study, items: Items) -> Items:
+    """Return the items at the beginning of the steps that items lie in."""
+    state, place, facet = study.parted(items)
+    return study.items(state, place - place % study.grid.parts, facet)
+
+
+def halve_changes(study: Study, changes: Rows) -> Rows:
+    """Find where in their steps verdicts change.
+
+    Parameters
+    ----------
+    study : Study
+        The study; its grid has halvings.
+    changes : (k,) structured array of CHANGE_DTYPE
+        Which steps.
+
+    Returns
+    -------
+    structured array of SAMPLE_DTYPE
+        What was asked, each once, ascending.
+    """
+    state, low, facet = study.parted(changes["item"])
+    series = state * study.facets + facet
+    brackets = Brackets(series, low, low + study.grid.parts, changes["before"], changes["after"])
+    found = [np.zeros(0, dtype=SAMPLE_DTYPE)]
+    while len((brackets := brackets.taken(wide(brackets))).series):
+        state, facet = np.divmod(brackets.series, study.facets)
+        items = study.items(state, middles(brackets), facet)
+        found.append(solve_items(study, items))
+        verdicts = np.empty(len(items), dtype=np.uint8)
+        verdicts[np.argsort(items)] = found[-1]["verdict"]
+        brackets = halves(brackets, verdicts)
+    rows = np.concatenate(found)
+    return rows[np.argsort(rows["item"])]
+
+
+def changes_of(study: Study, samples: Rows) -> list[Rows]:
+    """List the steps in which a verdict changes, in chunks of steps that share their cases.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    samples : structured array of SAMPLE_DTYPE
+        Every item of the grid, ascending.
+
+    Returns
+    -------
+    list of structured arrays of CHANGE_DTYPE
+        Each of one initial state and one step, ascending.
+    """
+    shape = (len(study.cases), len(study.grid.tof_s), study.facets)
+    verdict, item = samples["verdict"].reshape(shape), samples["item"].reshape(shape)
+    changed = verdict[:, :-1] != verdict[:, 1:]
+    chunks = []
+    for state, step in np.argwhere(changed.any(axis=2)).tolist():
+        facet = np.flatnonzero(changed[state, step])
+        rows = np.zeros(len(facet), dtype=CHANGE_DTYPE)
+        rows["item"] = item[state, step, facet]
+        rows["before"], rows["after"] = verdict[state, step, facet], verdict[state, step + 1, facet]
+        chunks += [rows[i : i + CHUNK_CHANGES] for i in range(0, len(rows), CHUNK_CHANGES)]
+    return chunks
 
 
 def blank_samples(items: Items) -> Rows:
