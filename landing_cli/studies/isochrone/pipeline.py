@@ -43,6 +43,7 @@ from landing_cli.studies.isochrone.time_grid import TimeGrid, time_grid
 from landing_cli.studies.isochrone.work import (
     Items,
     Study,
+    ask,
     blank_samples,
     changes_of,
     halve_changes,
@@ -177,7 +178,7 @@ def _solve(
         progress(done, max(total, done))
 
     chunks = [items.view(ITEM_DTYPE) for items in in_chunks(study.grid_items)]
-    samples, lost = solve_recorded(journal, "grid", chunks, partial(_ask, study), _itself, plan, told)
+    samples, lost = solve_recorded(journal, "grid", chunks, partial(ask, study), _itself, plan, told)
     samples = np.concatenate([samples, blank_samples(np.array(list(lost), dtype=np.int64))])
     samples = samples[np.argsort(samples["item"])]
     ends = samples[:0]
@@ -191,10 +192,6 @@ def _solve(
     return IsochroneRun(
         tuple(_state_result(study, index, samples, ends, lost) for index in range(len(study.cases)))
     )
-
-
-def _ask(study: Study, questions: Rows) -> Rows:
-    return solve_items(study, questions["item"])
 
 
 def _itself(items: Items) -> Items:

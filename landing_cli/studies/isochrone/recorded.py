@@ -73,7 +73,7 @@ def solve_recorded(
             if isinstance(answer, LostChunk):
                 lost |= dict.fromkeys(answer.items["item"].tolist(), answer.reason)
                 continue
-            journal.append(f"{stage}/{answer['item'][0]}", {"samples": answer})
+            journal.append(f"{stage}/{owners(answer['item']).min()}", {"samples": answer})
             parts.append(answer)
             told(len(answer))
     rows = np.concatenate([np.zeros(0, dtype=SAMPLE_DTYPE), *parts])

@@ -190,6 +190,11 @@ def changes_of(study: Study, samples: Rows) -> list[Rows]:
     return chunks
 
 
+def ask(study: Study, questions: Rows) -> Rows:
+    """Solve questions of the grid: rows with a field ``item``; see `solve_items`."""
+    return solve_items(study, questions["item"])
+
+
 def blank_samples(items: Items) -> Rows:
     """Answers to items that were lost: unresolved."""
     rows = np.zeros(len(items), dtype=SAMPLE_DTYPE)
