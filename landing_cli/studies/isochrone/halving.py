@@ -4,7 +4,8 @@ A verdict is one of three, so the middle of a bracket may differ from both its e
 brackets. Halving by the verdict itself, not by the root of a fitted margin, makes every end a pair of answers
 that `reach run` gives at those two times, whatever the shape of the margin in between. It asks for as many
 solves as there are bits between step and tolerance (6 from 25 s to 0.4 s), and facets of the same step share
-their cases in the first of them.
+their cases in the first of them. The root of the least thrust level would spare the early halvings, which are
+the cheap ones: close to the end a verdict takes the fine time grid, on which the level is no cheaper to find.
 """
 
 from __future__ import annotations

@@ -18,6 +18,9 @@ from landing_cli.errors import InputRefused
 from landing_cli.reach.records import LandingCase
 from landing_cli.scenario.schema_isochrone import MOST_STEPS, IsochroneSection
 
+# Gravity and the mass that is burnt may make the shortest flight shorter than the crossing by some percent.
+SHORTER = 0.9
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
@@ -113,8 +116,8 @@ def time_grid(
 
 
 def _first_s(cases: tuple[LandingCase, ...], shortest_asked_s: float, step_s: float) -> float:
-    """Shortest time worth asking: of a crossing to the nearest facet, or what the scenario asks if less."""
-    crossing = min(_crossing_s(case) for case in cases)
+    """Shortest time worth asking: a little less than the crossing, or what the scenario asks if less."""
+    crossing = SHORTER * min(_crossing_s(case) for case in cases)
     final = max(case.final_stage_s for case in cases)
     first = step_s * math.floor(min(crossing, shortest_asked_s) / step_s)
     return max(first, min(step_s * (math.floor(final / step_s) + 1.0), shortest_asked_s))

@@ -32,23 +32,24 @@ def growth_figure(cases: tuple[StateResult, ...]) -> Figure:
     """
     case, grid = cases[0].case, cases[0].grid
     area_m2 = facet_areas(case.asteroid.mesh)
-    figure = plotting.new_figure(7.2, 4.1)
+    figure = plotting.new_figure(8.2, 4.1)
     plotting.add_title(
         figure,
         f"{body_name(case)}: how the reachable domain grows with the time of flight",
-        f"{len(area_m2)} facets, {area_m2.sum() / 1e6:.4g} km²; {craft_facts(case)}",
+        craft_facts(case),
     )
     axes = figure.add_axes((0.09, 0.125, 0.79, 0.70))
     total_km2 = area_m2.sum() / 1e6
     for index, result in enumerate(cases):
         tof_s, reachable_m2 = reachable_area(result.intervals, area_m2)
-        ends = np.concatenate([[grid.tof_s[0]], tof_s, [grid.tof_s[-1]]])
-        curve = np.concatenate([[0.0], reachable_m2, reachable_m2[-1:] if len(tof_s) else [0.0]]) / 1e6
+        within = tof_s <= grid.tof_s[-1]  # what lasts to the end of the range ends just beyond it
+        times = np.concatenate([[grid.tof_s[0]], tof_s[within], [grid.tof_s[-1]]])
+        curve = np.concatenate([[0.0], reachable_m2[within]]) / 1e6
         look = {"color": COLOURS[index % len(COLOURS)], "ls": "-" if index < len(COLOURS) else "--"}
-        axes.step(ends[ends <= grid.tof_s[-1]], curve[ends <= grid.tof_s[-1]], where="post", **look)
+        axes.step(times, np.append(curve, curve[-1]), where="post", **look)
         name = result.case.name.replace("_", " ")
         half = result.summary["first_tof_s"]["median"]
-        label = name if half is None else f"{name}: half of it from {half:.0f} s"
+        label = name if half is None else f"{name}: half of its facets from {half:.0f} s"
         axes.plot([], [], label=label, **look)
     axes.set(
         xlim=(grid.tof_s[0], grid.tof_s[-1]),

@@ -58,7 +58,10 @@ def isochrone_figure(result: StateResult, surface: SurfaceMap) -> Figure:
     scale = _time_scale(first)
     colours, key = _painted(result, scale)
     hatched = verdict == Verdict.UNRESOLVED
-    levels = scale_levels(scale)
+    named = scale_levels(scale)
+    step = float(named[1] - named[0]) if len(named) > 1 else 0.0
+    between = np.append(named, named[0] - step) + 0.5 * step if step else named
+    levels = np.union1d(named, between)
     lines = level_segments(mesh, first, levels)
     border = border_segments(mesh, reachable, ~reachable)
 
@@ -67,14 +70,14 @@ def isochrone_figure(result: StateResult, surface: SurfaceMap) -> Figure:
     for index, view in enumerate(
         (view_from(sights(case.position_m)[0]), view_from(-sights(case.position_m)[0]))
     ):
-        axes = figure.add_axes((0.015, 0.485 - 0.45 * index, 0.26, 0.39))
+        axes = figure.add_axes((0.015, 0.455 - 0.445 * index, 0.26, 0.38))
         draw_surface(axes, mesh, view, colours, hatched)
         draw_segments(axes, mesh, view, lines, **LEVELS)
         draw_segments(axes, mesh, view, border, **BORDER)
         reach = 1.15 * reach_m(mesh, view)
         axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
         axes.axis("off")
-        draw_triad(axes, view)
+        draw_triad(axes, view, at=(0.9, 0.12))
         draw_scale_bar(axes, reach)
         axes.set_title(("a  30° off the initial position", "b  from the far side")[index])
     axes = figure.add_axes((0.335, 0.245, 0.655, 0.60))
@@ -84,9 +87,9 @@ def isochrone_figure(result: StateResult, surface: SurfaceMap) -> Figure:
     axes.plot(*lon_lat_deg(case.position_m), **START, clip_on=False, zorder=6)
     frame_map(axes)
     axes.set_title("c  longitude and latitude")
-    for level in levels:
+    for level in named:
         _name_level(axes, level_segments(mesh, first, np.array([level])), float(level))
-    _explain(figure, scale, key, has_border=bool(len(border)))
+    _explain(figure, scale, key, has_border=bool(len(border)), step_s=0.5 * step)
     return figure
 
 
@@ -143,10 +146,13 @@ def _name_level(axes: Axes, segments: FloatArray, level: float) -> None:
     axes.text(lon, lat, f"{level:g}", bbox={"fc": "white", "ec": "none", "alpha": 0.75, "pad": 0.8}, **look)
 
 
-def _explain(figure: Figure, scale: ScalarMappable, key: list[KeyEntry], has_border: bool) -> None:
+def _explain(
+    figure: Figure, scale: ScalarMappable, key: list[KeyEntry], has_border: bool, step_s: float
+) -> None:
     """Colour bar below the map, marks beside it."""
     bar = figure.colorbar(scale, cax=figure.add_axes((0.335, 0.115, 0.27, 0.025)), orientation="horizontal")
-    bar.set_label("first time of flight that reaches it (s)", labelpad=2)
+    every = f"; contours every {step_s:g} s" if step_s else ""
+    bar.set_label(f"first time of flight that reaches it (s){every}", labelpad=2)
     bar.outline.set_visible(False)
     handles = legend_handles(key, border=has_border, levels=None, counts=True)
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.63, 0.165), labelspacing=0.5)
