@@ -9,6 +9,7 @@ import numpy as np
 from landing_cli.reach.records import Verdict
 from landing_cli.reach.stored_checks import check_choices, check_printable, check_summary
 from landing_cli.results.body_checks import bounded, positive
+from landing_cli.results.columns import Column
 from landing_cli.scenario.schema_isochrone import MOST_HALVINGS, MOST_STEPS
 from landing_cli.studies.isochrone.records import FACET_COLUMNS, INTERVAL_COLUMNS, End, Rows, StateResult
 from landing_cli.studies.isochrone.summary import summarise
@@ -115,7 +116,7 @@ def _check_intervals(rows: Rows, count: int, grid: TimeGrid) -> None:
             raise ValueError("an end of an interval has no other side, or one too many")
 
 
-def _check_flags(rows: Rows, columns: tuple) -> None:  # type: ignore[type-arg]
+def _check_flags(rows: Rows, columns: tuple[Column, ...]) -> None:
     for column in columns:
         if column.flags is not None and not np.isin(rows[column.name], list(column.flags)).all():
             raise ValueError(f"{column.name} holds a value without a meaning")

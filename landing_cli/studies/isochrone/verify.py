@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from landing_cli.reach.free_descent import survey
 from landing_cli.reach.records import FacetSolutions, Verdict
@@ -230,7 +231,7 @@ def faults_of(result: StateResult) -> Iterator[str]:
             yield f"the summary says {name} {result.summary.get(name)}, the table {value}"
 
 
-def _equal(a: np.ndarray, b: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+def _equal(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.bool_]:
     """Equal to rounding, NaN to NaN."""
     return np.isclose(a.astype(np.float64), b.astype(np.float64), rtol=1e-12, atol=0.0, equal_nan=True)
 
@@ -243,6 +244,6 @@ def _same(a: object, b: object) -> bool:
     return a == b
 
 
-def _even(count: int, wanted: int) -> np.ndarray:  # type: ignore[type-arg]
+def _even(count: int, wanted: int) -> NDArray[np.int64]:
     """At most so many indices below a count, evenly spaced, first and last included."""
     return np.unique(np.linspace(0, count - 1, min(count, wanted)).round().astype(np.int64))

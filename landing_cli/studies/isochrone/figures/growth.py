@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -45,7 +45,10 @@ def growth_figure(cases: tuple[StateResult, ...]) -> Figure:
         within = tof_s <= grid.tof_s[-1]  # what lasts to the end of the range ends just beyond it
         times = np.concatenate([[grid.tof_s[0]], tof_s[within], [grid.tof_s[-1]]])
         curve = np.concatenate([[0.0], reachable_m2[within]]) / 1e6
-        look = {"color": COLOURS[index % len(COLOURS)], "ls": "-" if index < len(COLOURS) else "--"}
+        look: dict[str, Any] = {
+            "color": COLOURS[index % len(COLOURS)],
+            "ls": "-" if index < len(COLOURS) else "--",
+        }
         axes.step(times, np.append(curve, curve[-1]), where="post", **look)
         name = result.case.name.replace("_", " ")
         half = result.summary["first_tof_s"]["median"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -142,7 +142,13 @@ def _name_level(axes: Axes, segments: FloatArray, level: float) -> None:
         return
     place = lon_lat_deg(segments.mean(axis=1))
     lon, lat = place[np.argmin(np.hypot(place[:, 0] / 2.0, place[:, 1]))]
-    look = {"fontsize": 7.5, "ha": "center", "va": "center", "color": plotting.INK, "zorder": 7}
+    look: dict[str, Any] = {
+        "fontsize": 7.5,
+        "ha": "center",
+        "va": "center",
+        "color": plotting.INK,
+        "zorder": 7,
+    }
     axes.text(lon, lat, f"{level:g}", bbox={"fc": "white", "ec": "none", "alpha": 0.75, "pad": 0.8}, **look)
 
 
