@@ -14,6 +14,7 @@ from landing_cli.parallel.plan import WorkPlan
 pin_blas_threads()
 
 from validation_domain import Runs, domains, draw_delta_v, facts, verification  # noqa: E402
+from validation_isochrone import isochrones  # noqa: E402
 from validation_observe import observed_landings  # noqa: E402
 from validation_plan import landing_plans  # noqa: E402
 from validation_section import claims, draw_azimuths, sections, sweep_all  # noqa: E402
@@ -86,6 +87,8 @@ def main() -> None:
     parts += [against_truth(), families(runs["bennu"]), claims(swept)]
     say("boundaries followed")
     parts.append(traces(runs, images))
+    say("times of flight that reach each facet")
+    parts.append(isochrones(runs["bennu"], images, say))
     say("plans to one site")
     parts.append(landing_plans())
     say("landings that see")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from landing_cli.cli import console, observe, plan, reach, tour
+from landing_cli.cli import console, isochrone, observe, plan, reach, tour
 from landing_cli.cli.options import Force, Jobs, Json, Output, Quiet, ResultFile, new_group
 from landing_cli.errors import InputRefused, OutputRefused, UsageError, VerificationFailed
 
@@ -22,7 +22,13 @@ if TYPE_CHECKING:
 app = new_group("Look at, export, draw, verify and compare result files.")
 
 # missions whose results this version reads: how to print them; each brings stored, figures, verify
-MISSIONS: dict[str, ModuleType] = {"reach": reach, "plan": plan, "observe": observe, "tour": tour}
+MISSIONS: dict[str, ModuleType] = {
+    "reach": reach,
+    "plan": plan,
+    "observe": observe,
+    "tour": tour,
+    "isochrone": isochrone,
+}
 
 CaseName = Annotated[
     str | None,
@@ -46,6 +52,9 @@ class ExportedTable(StrEnum):
     LANDMARKS = "landmarks"
     VIEW = "view"
     WHY_NOT = "why_not"
+    INTERVALS = "intervals"
+    DOMAIN = "domain"
+    GROWTH = "growth"
 
 
 class ExportFormat(StrEnum):
@@ -126,6 +135,10 @@ def export(
     ] = None,
     case: CaseName = None,
     facet: Facet = None,
+    tof_s: Annotated[
+        float | None,
+        typer.Option("--tof-s", metavar="T", help="Time of flight of an isochrone study's domain, s."),
+    ] = None,
     form: Annotated[
         ExportFormat,
         typer.Option("--format", help="csv, json; ply, vtp, obj: a map of facets; oem: a trajectory."),
@@ -143,14 +156,15 @@ def export(
     if form is ExportFormat.PLY and output is None:
         raise UsageError("ply is binary", fix="name a file with -o")
     result = _read(run)
-    chosen = table or _usual_table(result, form)
+    chosen = table or (_usual_table(result, form) if tof_s is None else ExportedTable.DOMAIN)
     _refuse_nonsense(result, chosen, form, facet)
+    _refuse_time(chosen, tof_s)
     if output is not None:
         _refuse_existing(output, run, force)
     if chosen is ExportedTable.WHY_NOT:
         data = _why_not(result, form, case, jobs, console.Console(quiet))
     else:
-        data = _exported(result, chosen, form, case, facet)
+        data = _exported(result, chosen, form, case, facet, tof_s)
     if output is None:
         console.print_text(data.decode())
         return
@@ -251,7 +265,7 @@ def _refuse_nonsense(
         )
     if facet is not None:
         _refuse_facet(result)
-    if form in MAP_FORMATS and table is not ExportedTable.FACETS:
+    if form in MAP_FORMATS and table not in (ExportedTable.FACETS, ExportedTable.DOMAIN):
         raise UsageError(
             f"{form} is a map of facets, not of a {table}", fix="take csv or json for this table"
         )
@@ -263,6 +277,17 @@ def _refuse_nonsense(
         raise UsageError(f"--facet does not go with the {table} table", fix="add --table trajectory")
 
 
+def _refuse_time(table: ExportedTable, tof_s: float | None) -> None:
+    """A domain is of one time of flight, and nothing else is."""
+    if (tof_s is None) == (table is ExportedTable.DOMAIN):
+        told = (
+            "a domain is of one time of flight"
+            if tof_s is None
+            else f"--tof-s does not go with the {table} table"
+        )
+        raise UsageError(told, fix="name it with --tof-s" if tof_s is None else "add --table domain")
+
+
 def _refuse_existing(path: Path, run: Path, force: bool) -> None:
     if path.exists() and path.samefile(run):
         raise OutputRefused("is the result that is exported", where=str(path), fix="take another name")
@@ -271,14 +296,20 @@ def _refuse_existing(path: Path, run: Path, force: bool) -> None:
 
 
 def _exported(
-    result: StoredResult, table: ExportedTable, form: ExportFormat, case: str | None, facet: int | None
+    result: StoredResult,
+    table: ExportedTable,
+    form: ExportFormat,
+    case: str | None,
+    facet: int | None,
+    tof_s: float | None,
 ) -> bytes:
     """Make what is to be written."""
     run, exports = _run_of(result), _module(result, "exports")
+    at = {} if tof_s is None else {"tof_s": tof_s}
     if form in MAP_FORMATS:
-        return bytes(exports.export_map(run, form.value, case))
+        return bytes(exports.export_map(run, form.value, case, **at))
     if table is not ExportedTable.TRAJECTORY:
-        return str(exports.export_table(run, table.value, form.value, case)).encode()
+        return str(exports.export_table(run, table.value, form.value, case, **at)).encode()
     cases = exports.chosen_cases(run, case)
     if len(cases) > 1:
         names = exports.names_of(cases)

@@ -21,6 +21,7 @@ from landing_cli.scenario.schema_base import (
     wrong,
 )
 from landing_cli.scenario.schema_body import Body
+from landing_cli.scenario.schema_isochrone import IsochroneSection
 from landing_cli.scenario.schema_observe import ObserveSection
 from landing_cli.scenario.schema_plan import PlanSection
 from landing_cli.scenario.schema_tour import TourScenario
@@ -219,6 +220,9 @@ class Scenario(Section):
     observe: ObserveSection | None = Field(
         None, description="the landing that sees its landmarks: `plan observe`"
     )
+    isochrone: IsochroneSection | None = Field(
+        None, description="the times of flight at which each facet is reachable: `reach isochrone`"
+    )
 
     def model_post_init(self, context: Any, /) -> None:
         """Refuse a scenario that asks nothing, and a fit to a field that needs none."""
@@ -226,6 +230,8 @@ class Scenario(Section):
             raise wrong(
                 "reach", "is missing, and so are plan and observe", "a scenario asks for at least one"
             )
+        if self.isochrone is not None and self.reach is not None:
+            self.isochrone.check_against(self.reach.final_stage_s)
 
 
 AnyScenario = Scenario | TourScenario

@@ -6,10 +6,16 @@ from landing_cli.errors import InputRefused
 from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.messages import Problem, refusal
 from landing_cli.scenario.schema import Reach, Scenario
+from landing_cli.scenario.schema_isochrone import IsochroneSection
 from landing_cli.scenario.schema_observe import ObserveSection
 from landing_cli.scenario.schema_plan import PlanSection
 
-MISSIONS = ("reach", "plan", "observe")
+MISSIONS = (
+    "reach",
+    "plan",
+    "observe",
+    "isochrone",
+)
 
 
 def reach_section(loaded: LoadedScenario) -> Reach:
@@ -79,21 +85,26 @@ def observe_section(loaded: LoadedScenario) -> ObserveSection:
     return loaded.scenario.observe
 
 
-def for_mission(scenario: Scenario, mission: str) -> Scenario:
+def isochrone_section(loaded: LoadedScenario) -> IsochroneSection:
+    """Return what a scenario says for ``reach isochrone``; the defaults where it says nothing."""
+    return loaded.scenario.isochrone or IsochroneSection()
+
+
+def for_mission(scenario: Scenario, *missions: str) -> Scenario:
     """Drop the sections of other missions: what they say changes no number of this one.
 
     Parameters
     ----------
     scenario : Scenario
         All of it.
-    mission : {"reach", "plan", "observe"}
-        Whose section stays.
+    *missions : {"reach", "plan", "observe", "isochrone"}
+        Whose sections stay.
 
     Returns
     -------
     Scenario
     """
-    return scenario.model_copy(update={name: None for name in MISSIONS if name != mission})
+    return scenario.model_copy(update={name: None for name in MISSIONS if name not in missions})
 
 
 def _missing(loaded: LoadedScenario, name: str, fix: str) -> InputRefused:

@@ -24,7 +24,7 @@ from hostile_inputs import hostile_inputs
 from kill_runs import kill_runs
 from kill_workers import deadly_facet, finish_deadly, kill_dask_workers, kill_workers
 from overhead import overhead
-from programs import TOY, Reference, Tally, reach_run
+from programs import TOY, Reference, Tally, reach_isochrone, reach_run
 from same_numbers import same_numbers
 
 # a small case of the real command: one start, two times of flight, some 5000 facets
@@ -79,7 +79,8 @@ PARTS: dict[str, Callable[[Reference, Path, argparse.Namespace], list[Tally]]] =
 
 def torture(arguments: argparse.Namespace, folder: Path) -> list[Tally]:
     sets = arguments.set or SMALL
-    program = TOY if arguments.program == "toy" else reach_run(arguments.scenario, *sets)
+    real = reach_isochrone if arguments.program == "isochrone" else reach_run
+    program = TOY if arguments.program == "toy" else real(arguments.scenario, *sets)
     reference = Reference.make(program, folder)
     tallies = []
     for part in arguments.parts:
@@ -103,7 +104,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--program", choices=["toy", "reach"], default="reach")
+    parser.add_argument("--program", choices=["toy", "reach", "isochrone"], default="reach")
     parser.add_argument("--parts", nargs="+", choices=list(PARTS), default=list(PARTS))
     parser.add_argument("--scenario", default="bennu.yaml", help="for --program reach")
     parser.add_argument(

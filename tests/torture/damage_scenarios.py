@@ -85,6 +85,11 @@ OPTIONAL = (
     "timing",
     "nodes",
     "knots",
+    # of an isochrone study
+    "tof_min_s",
+    "tof_max_s",
+    "step_s",
+    "tolerance_s",
     # of a tour
     "catalogue",
     "perihelion_max_au",

@@ -49,6 +49,15 @@ def reach_run(scenario: str, *sets: str) -> Program:
     return Program("reach run", words, ("--set", "reach.final_stage_s=190"), CHUNK_FACETS)
 
 
+def reach_isochrone(scenario: str, *sets: str) -> Program:
+    """Return ``reach isochrone`` on a scenario, with overrides like ``isochrone.step_s=10``."""
+    from landing_cli.reach.facet_work import CHUNK_FACETS
+
+    overrides = [word for key in sets for word in ("--set", key)]
+    words = (str(HERE / "traced_isochrone.py"), "isochrone", scenario, *overrides)
+    return Program("reach isochrone", words, ("--set", "reach.final_stage_s=190"), CHUNK_FACETS)
+
+
 def trace_of(output: Path) -> Path:
     return output.parent.with_name(f"{output.parent.name}.trace")
 
