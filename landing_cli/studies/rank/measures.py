@@ -15,7 +15,7 @@ IntArray = NDArray[np.int64]
 
 # facets in a neighbourhood below which a plane through them says nothing about the ground
 FEWEST_FACETS = 4
-MOST_PAIRS = 100_000_000
+MOST_PAIRS, PAIRS_AT_ONCE = 20_000_000, 500_000
 
 
 def slopes_deg(
@@ -74,14 +74,22 @@ def roughness_m(mesh: Mesh, radius_m: float) -> FloatArray:
     count = len(mesh.faces)
     held = np.bincount(here, minlength=count)
     if held.min() < FEWEST_FACETS:
-        lonely = int(np.argmin(held))
-        raise InputRefused(
-            f"within {radius_m:g} m of facet {lonely} are {held[lonely]} facets, no plane to measure from",
-            where="--radius-m",
-            fix=f"take at least {_least_radius_m(mesh):.3g} m",
-        )
-    area, corners = facet_areas(mesh)[there], mesh.corners[there]
-    corners = corners - facet_centroids(mesh)[here][:, None]  # about the facet: nothing cancels
+        raise _too_small(mesh, radius_m, held)
+    areas, corners, centroids = facet_areas(mesh), mesh.corners, facet_centroids(mesh)
+    found = np.zeros(count)
+    ends = np.concatenate([[0], np.cumsum(held)])
+    first = 0
+    while first < count:  # in pieces: bounds the memory
+        last = max(first + 1, int(np.searchsorted(ends, ends[first] + PAIRS_AT_ONCE, side="right")) - 1)
+        own = slice(ends[first], ends[last])
+        about = corners[there[own]] - centroids[here[own], None]  # about the facet: nothing cancels
+        found[first:last] = _root_mean_square(here[own] - first, areas[there[own]], about, last - first)
+        first = last
+    return found
+
+
+def _root_mean_square(here: IntArray, area: FloatArray, corners: FloatArray, count: int) -> FloatArray:
+    """Root mean square distance of triangles, grouped by ``here``, from the best plane of each group."""
     centroid = corners.mean(axis=1)
     total = np.bincount(here, area, count)
     middle = np.stack([np.bincount(here, area * centroid[:, i], count) / total for i in range(3)], axis=1)
@@ -118,10 +126,14 @@ def _neighbourhoods(mesh: Mesh, radius_m: float) -> tuple[IntArray, IntArray]:
     return here[order], there[order]
 
 
-def _least_radius_m(mesh: Mesh) -> float:
-    """Radius within which every facet has the fewest facets, if they face its way, m."""
-    from scipy.spatial import cKDTree
-
-    centroids = facet_centroids(mesh)
-    distance, _ = cKDTree(centroids).query(centroids, k=min(FEWEST_FACETS, len(centroids)))
-    return 1.01 * float(np.max(distance[:, -1]))
+def _too_small(mesh: Mesh, radius_m: float, held: IntArray) -> InputRefused:
+    """Say where a radius holds too little, and which one would do."""
+    lonely, extent = int(np.argmin(held)), float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+    what = f"within {radius_m:g} m of facet {lonely} are {held[lonely]} facets, no plane to measure from"
+    larger = radius_m
+    while larger < extent:
+        larger *= 1.25
+        if np.bincount(_neighbourhoods(mesh, larger)[0]).min() >= FEWEST_FACETS:
+            fix = f"{float(f'{larger:.2g}') * 1.05:.2g} m would do"
+            return InputRefused(what, where="--radius-m", fix=fix)
+    return InputRefused(what, where="--radius-m", fix="the shape is too coarse for a neighbourhood")

@@ -10,6 +10,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import cached_property
 from itertools import pairwise
 from typing import TypeGuard
 
@@ -59,7 +60,7 @@ class Axis:
     texts: tuple[str, ...]
     name: str = ""
 
-    @property
+    @cached_property
     def values(self) -> tuple[float | str, ...]:
         """The values: numbers where all of them are, else texts."""
         found = [parse_scalar(text) for text in self.texts]
@@ -114,10 +115,12 @@ def parse_axis(text: str) -> Axis:
     if len(texts) > MOST_VALUES:
         raise UsageError(f"has {len(texts)} values", where=where, fix=f"at most {MOST_VALUES}")
     axis = Axis(key, texts)
-    for place, value in enumerate(axis.values):
-        if value in axis.values[:place]:
-            told = f"{texts[axis.values.index(value)]} and {texts[place]} are one value"
+    first: dict[float | str, str] = {}
+    for value, written in zip(axis.values, texts, strict=True):
+        if value in first:
+            told = f"{first[value]} and {written} are one value"
             raise UsageError(told, where=where, fix="give each value once")
+        first[value] = written
     return axis
 
 

@@ -279,11 +279,12 @@ def _check_axes(question: Question, cases: Sequence[LandingCase], states: int) -
                 where=where,
                 fix="`landing scenario show` tells what each key means",
             )
-        for i, one in enumerate(along):
-            if one in along[:i]:
-                twin = axis.texts[along.index(one)]
-                told = f"{twin} and {axis.texts[i]} ask the same"
+        first: dict[object, str] = {}
+        for one, text in zip(along, axis.texts, strict=True):
+            if one in first:
+                told = f"{first[one]} and {text} ask the same"
                 raise UsageError(told, where=where, fix="give each value once")
+            first[one] = text
 
 
 def _for_reach(document: Document) -> Document:
