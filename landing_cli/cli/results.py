@@ -104,7 +104,8 @@ def verify(
 
     In the scenario's own gravity each flight must meet its touchdown to 5 cm and 1 mm/s and keep every
     constraint; what does not ends with exit code 5. How far the same controls miss under the gravity of
-    the mesh as a uniform polyhedron, the error of the gravity model, is reported and fails nothing.
+    the mesh as a uniform polyhedron, the error of the gravity model, is reported and fails nothing. Of a
+    sweep, which stores no flights, some cases are solved again first (--all: every case).
     """
     result = _read(run)
     cases = _module(result, "exports").chosen_cases(_run_of(result), case)

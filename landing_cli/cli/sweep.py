@@ -199,7 +199,7 @@ def print_verification(reports: Sequence[CaseReport], path: Path, as_json: bool)
         [
             report.case,
             report.facets,
-            report.worst["again_verdict"].failing,
+            len(report.faults),
             report.worst["again_performance_index_m2_s3"].value,
             report.flown,
             *(report.worst[name].value if name in report.worst else None for name in _FLOWN),
@@ -207,7 +207,7 @@ def print_verification(reports: Sequence[CaseReport], path: Path, as_json: bool)
         ]
         for report in reports
     ]
-    columns = ["case", "solved_again", "verdicts_apart", "j_apart", "flown", *_FLOWN, "verdict"]
+    columns = ["case", "solved_again", "faults", "j_apart", "flown", *_FLOWN, "verdict"]
     console.print_table(columns, rows, title="Verification")
 
 

@@ -50,11 +50,11 @@ def write_figures(
     cases = chosen_cases(run, case)
     if facet is not None:
         check_facet(cases, facet)
-        figures = _of_facet(run, facet)
+        figures = _of_facet(run, cases, facet)
     elif len(cases) == 1:
         figures = _of_case(cases[0])
     else:
-        figures = _of_grid(run, cases, whole=case is None)
+        figures = _of_grid(run, cases, case)
     with plotting.style():
         for name, figure in figures:
             path = stem.with_name(f"{stem.name}-{name}.png")
@@ -62,10 +62,10 @@ def write_figures(
             yield path
 
 
-def _of_grid(run: SweepRun, cases: tuple[CellResult, ...], whole: bool) -> Iterator[tuple[str, Figure]]:
+def _of_grid(run: SweepRun, cases: tuple[CellResult, ...], case: str | None) -> Iterator[tuple[str, Figure]]:
     from landing_cli.studies.sweep.share_map import share_figure
 
-    if whole:
+    if case is None:
         areas = np.array([case.summary["reachable_area_m2"] for case in run.cases])
         large = areas.max(initial=0.0) >= 1e7
         unit, scale = ("km²", 1e-6) if large else ("1000 m²", 1e-3)
@@ -73,11 +73,13 @@ def _of_grid(run: SweepRun, cases: tuple[CellResult, ...], whole: bool) -> Itera
         medians = [case.summary["delta_v_m_s"]["median"] for case in run.cases]
         middle = np.array([np.nan if value is None else value for value in medians])
         yield from grid_figures(run, Quantity("delta-v", "median velocity increment (m/s)", middle))
-    yield "share", share_figure(run, cases)
+    yield "share" if case is None else f"{case}-share", share_figure(run, cases)
 
 
-def _of_facet(run: SweepRun, facet: int) -> Iterator[tuple[str, Figure]]:
-    values = np.array([case.columns["delta_v_m_s"][facet] for case in run.cases])
+def _of_facet(run: SweepRun, cases: tuple[CellResult, ...], facet: int) -> Iterator[tuple[str, Figure]]:
+    values = np.full(len(run.cases), np.nan)
+    for case in cases:
+        values[case.cell * len(run.grid.states) + case.state] = case.columns["delta_v_m_s"][facet]
     label = f"velocity increment to facet {facet} (m/s)"
     yield from grid_figures(run, Quantity(f"facet{facet}", label, values))
 

@@ -131,12 +131,15 @@ class SweepRun:
     grid : Grid
     asteroid : Asteroid
         Of the first cell: its surface is that of all.
+    columns : mapping of (cells times states times facets,) arrays
+        ``CELL_COLUMNS`` of all cases, which their own are parts of.
     cases : tuple of CellResult
         Cell after cell, state after state.
     """
 
     grid: Grid
     asteroid: Asteroid
+    columns: Columns
     cases: tuple[CellResult, ...]
 
     @cached_property
@@ -183,7 +186,7 @@ def gathered(
                 lost=lost.get(index, {}),
             )
         )
-    return SweepRun(grid, asteroid, tuple(cases))
+    return SweepRun(grid, asteroid, columns, tuple(cases))
 
 
 def case_name(grid: Grid, cell: int, state: int) -> str:

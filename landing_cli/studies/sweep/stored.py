@@ -151,7 +151,7 @@ def _columns(run: SweepRun) -> dict[str, Dataset]:
     shape = (*grid.question.shape, len(grid.states), grid.facets)
     found = {}
     for column in CELL_COLUMNS:
-        data = np.concatenate([case.columns[column.name] for case in run.cases]).reshape(shape)
+        data = run.columns[column.name].reshape(shape)
         words = flag_words(column.flags) if column.flags else None
         found[column.name] = Dataset(data, column.units, column.description, dims, words)
     return found

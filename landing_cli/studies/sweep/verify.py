@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.parallel import LostChunk, WorkPlan, run_chunks
+from landing_cli.reach.consistency import Fault
 from landing_cli.reach.facet_work import in_chunks, solve_items
 from landing_cli.reach.records import FacetSolutions, join
 from landing_cli.reach.stored import CaseResult
@@ -56,14 +57,16 @@ def verify_run(
     Returns
     -------
     tuple of CaseReport
-        One a case that was taken; ``again_<column>`` compares what is stored with the second solve.
+        One a case that was taken. A verdict, proof or binding constraint that the second solve does not
+        find is a fault; ``again_<column>`` is how far the numbers are apart.
     """
     chosen = results if polyhedron_for_all else tuple(results[i] for i in _spread(len(results)))
     reports, plan = [], WorkPlan(jobs, "threads", None)
     for place, stored in enumerate(chosen):
         solved = _solve_again(stored, plan)
         (report,) = verify_reach((solved,), polyhedron_for_all=polyhedron_for_all, jobs=jobs)
-        reports.append(replace(report, worst={**_compared(stored, solved.solutions), **report.worst}))
+        faults, worst = _compared(stored, solved.solutions)
+        reports.append(replace(report, faults=(*faults, *report.faults), worst={**worst, **report.worst}))
         progress((place + 1) * stored.grid.facets, len(chosen) * stored.grid.facets)
     return tuple(reports)
 
@@ -82,17 +85,19 @@ def _solve_again(stored: CellResult, plan: WorkPlan) -> CaseResult:
     return CaseResult(case, stored.initial_state, solutions, summary)
 
 
-def _compared(stored: CellResult, solved: FacetSolutions) -> dict[str, Worst]:
+def _compared(stored: CellResult, solved: FacetSolutions) -> tuple[list[Fault], dict[str, Worst]]:
     """Where the second solve differs from what is stored; lost facets are not asked."""
-    again, found = kept_columns(solved), {}
+    again, faults, worst = kept_columns(solved), [], {}
     asked = np.setdiff1d(np.arange(stored.grid.facets), list(stored.lost))
-    for name in (*_EXACT, *_CLOSE):
-        before, now = stored.columns[name][asked], again[name][asked]
-        apart = _relative(before, now) if name in _CLOSE else (before != now).astype(np.float64)
-        limit = REPEATED if name in _CLOSE else 0.0
-        place, failing = int(np.argmax(apart)), int((apart > limit).sum())
-        found[f"again_{name}"] = Worst(float(apart[place]), limit, int(asked[place]), failing)
-    return found
+    for name in _EXACT:
+        other = asked[stored.columns[name][asked] != again[name][asked]]
+        told = f"has another {name} when it is solved again"
+        faults += [Fault(f"facet {facet} {told}", facet) for facet in other.tolist()]
+    for name in _CLOSE:
+        apart = _relative(stored.columns[name][asked], again[name][asked])
+        place, failing = int(np.argmax(apart)), int((apart > REPEATED).sum())
+        worst[f"again_{name}"] = Worst(float(apart[place]), REPEATED, int(asked[place]), failing)
+    return faults, worst
 
 
 def _relative(before: NDArray[np.float64], now: NDArray[np.float64]) -> NDArray[np.float64]:
