@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from math import prod
 from pathlib import Path
 
@@ -121,6 +122,11 @@ class Grid:
     def solves(self) -> int:
         """How many facets are solved in all."""
         return len(self.cases) * self.facets
+
+    @cached_property
+    def make_cases(self) -> Callable[[LoadedScenario], list[LandingCase]]:
+        """What makes the landing cases of a cell's scenario, one an initial state."""
+        return case_maker(self.surface)
 
 
 def ask(document: Document, source: str, beside: Path, axes: Sequence[Axis]) -> Question:

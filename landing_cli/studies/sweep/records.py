@@ -16,7 +16,7 @@ from landing_cli.reach.records import FACET_COLUMNS, FacetSolutions, LandingCase
 from landing_cli.reach.stored import CaseResult
 from landing_cli.reach.summary import summarise
 from landing_cli.results.columns import Column
-from landing_cli.studies.sweep.grid import Grid, case_maker
+from landing_cli.studies.sweep.grid import Grid
 
 Values = NDArray[Any]
 Columns = Mapping[str, Values]
@@ -105,8 +105,7 @@ class CellResult:
         if self.grid.cases:
             case = self.grid.cases[self.cell * len(self.grid.states) + self.state]
         else:  # read from a file: made when it is asked for
-            make = case_maker(self.grid.surface)
-            case = make(self.grid.question.scenario_at(self.cell))[self.state]
+            case = self.grid.make_cases(self.grid.question.scenario_at(self.cell))[self.state]
         return replace(case, name=self.name)
 
     def as_reach(self) -> CaseResult:
