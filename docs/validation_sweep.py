@@ -166,7 +166,7 @@ def _closed_forms() -> str:
     middle = int(np.argmin(np.linalg.norm(facet_centroids(wave) - (13.0, 13.0, 0.0), axis=1)))
     found, known = roughness_m(wave, 12.0)[middle], 0.05 * np.sqrt(2.0 / 6.0)
     return f"""On a triaxial ellipsoid that spins about a point mass the cosine of the slope is within {exact(apart)} of its closed
-form; the roughness of a sine over three wavelengths either way is {100 * abs(found / known - 1):.1f} % off that of the endless one."""
+form; the roughness of a sine over three wavelengths either way is {100 * abs(found / known - 1):.2g} % off that of the endless one."""
 
 
 def _polyhedron(run: ReachRun, ranking: Ranking) -> str:
