@@ -19,6 +19,7 @@ from validation_observe import observed_landings  # noqa: E402
 from validation_plan import landing_plans  # noqa: E402
 from validation_section import claims, draw_azimuths, sections, sweep_all  # noqa: E402
 from validation_solver import against_truth, families  # noqa: E402
+from validation_sweep import grids_and_sites  # noqa: E402
 from validation_tour import flyby_tours  # noqa: E402
 from validation_trace import traces  # noqa: E402
 
@@ -95,6 +96,9 @@ def main() -> None:
     parts.append(observed_landings())
     say("tours of asteroids")
     parts.append(flyby_tours(say))
+    say("grids of domains, sites in order")
+    swept_to = ROOT / "runs" / "bennu-reach-sweep.h5"
+    parts.append(grids_and_sites(runs, ROOT / "configs" / "bennu.yaml", swept_to, images, say))
     (DOCS / "validation.md").write_text(page(parts), encoding="utf-8")
     say(f"wrote {DOCS / 'validation.md'}")
 

@@ -7,12 +7,14 @@ from typing import Any
 
 import typer
 
-from landing_cli.cli import isochrone, observe, plan, reach, results, scenario, shapes, tour
+from landing_cli.cli import isochrone, observe, plan, rank, reach, results, scenario, shapes, sweep, tour
 from landing_cli.cli.options import new_program
 from landing_cli.errors import ExitCode
 
 plan.app.command("observe")(observe.observe)
 reach.app.command("isochrone")(isochrone.isochrone)
+reach.app.command("sweep")(sweep.sweep)
+reach.app.command("rank")(rank.rank)
 
 # console script -> its commands
 MISSIONS: dict[str, typer.Typer] = {

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from landing_cli.cli import console, isochrone, observe, plan, reach, tour
+from landing_cli.cli import console, isochrone, observe, plan, reach, sweep, tour
+from landing_cli.cli.comparison import Comparison
 from landing_cli.cli.options import Force, Jobs, Json, Output, Quiet, ResultFile, new_group
 from landing_cli.errors import InputRefused, OutputRefused, UsageError, VerificationFailed
 
@@ -28,6 +29,7 @@ MISSIONS: dict[str, ModuleType] = {
     "observe": observe,
     "tour": tour,
     "isochrone": isochrone,
+    "sweep": sweep,
 }
 
 CaseName = Annotated[
@@ -107,7 +109,8 @@ def verify(
 
     In the scenario's own gravity each flight must meet its touchdown to 5 cm and 1 mm/s and keep every
     constraint; what does not ends with exit code 5. How far the same controls miss under the gravity of
-    the mesh as a uniform polyhedron, the error of the gravity model, is reported and fails nothing.
+    the mesh as a uniform polyhedron, the error of the gravity model, is reported and fails nothing. Of a
+    sweep, which stores no flights, some cases are solved again first (--all: every case).
     """
     result = _read(run)
     cases = _module(result, "exports").chosen_cases(_run_of(result), case)
@@ -196,13 +199,7 @@ def plot(
     found = _read(run)
     if facet is not None:
         _refuse_facet(found)
-    folder = run.parent if out is None else out
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        fix = "choose another folder with --out"
-        raise OutputRefused(f"cannot be made: {error.strerror}", where=str(folder), fix=fix) from error
-    stem = folder / run.stem
+    stem = _folder(run.parent if out is None else out) / run.stem
     written = []
     for path in _module(found, "figures").write_figures(_run_of(found), stem, case, facet):
         written.append(str(path))
@@ -216,10 +213,30 @@ def plot(
 def diff(
     before: Annotated[Path, typer.Argument(metavar="A.h5", help="The earlier result.")],
     after: Annotated[Path, typer.Argument(metavar="B.h5", help="The later result.")],
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            "--table",
+            metavar="FILE.csv",
+            help="Write what changed as CSV: of reach runs the facets, else the table that is printed.",
+        ),
+    ] = None,
+    plot_it: Annotated[
+        bool, typer.Option("--plot", help="Draw maps of what changed as PNG files, one a case (reach runs).")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="DIR", help="Folder for --plot; beside B.h5 unless given."),
+    ] = None,
+    force: Force = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compare two results: what was asked differently, and what came out differently."""
+    """Compare two results: what was asked differently, and what came out differently.
+
+    Of reach runs: facets and area gained and lost, changes of J, of the thrust margin and of what binds;
+    --json lists the facets.
+    """
     old, new = _read(before), _read(after)
     if old.mission != new.mission:
         raise InputRefused(
@@ -228,13 +245,40 @@ def diff(
     voice = console.Console(quiet)
     for line in new.identity.differences(old.identity):
         voice.say(line)
-    if old.digest == new.digest:
+    equal = old.digest == new.digest
+    if equal:
         voice.say("the results are equal in every dataset and attribute")
-    cases = _module(new, "compare_runs").compare_runs(_run_of(old), _run_of(new))
+    comparison = Comparison(_module(new, "compare_runs"), _run_of(old), _run_of(new))
+    if out is not None and not plot_it:
+        raise UsageError("is the folder for figures", where="--out", fix="add --plot")
+    if plot_it and not comparison.has_facets:
+        raise UsageError(f"results of {new.mission} have no map of what changed", where="--plot")
+    cases = comparison.cases()
+    if table is not None:
+        for run in (before, after):
+            _refuse_existing(table, run, force)
+        from landing_cli.results.disk import replace_file
+
+        replace_file(table, comparison.csv().encode())
+        voice.say(f"wrote {table}")
+    if plot_it:
+        stem = _folder(after.parent if out is None else out) / f"{before.stem}-{after.stem}"
+        for path in comparison.figures(stem):
+            voice.say(f"wrote {path}")
     if as_json:
-        console.print_json({"equal": old.digest == new.digest, "cases": cases})
+        console.print_json({"equal": equal, "cases": comparison.with_facets(cases)})
     else:
         console.print_table(list(cases[0]), [list(case.values()) for case in cases])
+
+
+def _folder(folder: Path) -> Path:
+    """Make the folder that figures go to."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        fix = "choose another folder with --out"
+        raise OutputRefused(f"cannot be made: {error.strerror}", where=str(folder), fix=fix) from error
+    return folder
 
 
 def _usual_table(result: StoredResult, form: ExportFormat) -> ExportedTable:

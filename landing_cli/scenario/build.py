@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,7 +24,13 @@ from landing_cli.scenario.constants import GRAVITATIONAL_CONSTANT
 from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.messages import KeyPath, Problem, dotted, refusal
 from landing_cli.scenario.schema import Reach, Scenario
-from landing_cli.scenario.schema_body import AnyGravity, DipoleGravity, HarmonicsGravity, PointMassGravity
+from landing_cli.scenario.schema_body import (
+    AnyGravity,
+    Body,
+    DipoleGravity,
+    HarmonicsGravity,
+    PointMassGravity,
+)
 from landing_cli.sources.shape_files import read_shape
 from landing_cli.sources.shape_search import find_shape
 
@@ -58,6 +65,21 @@ class Built:
     shape_sha256: str
 
 
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A shape as it was read, about the scenario's origin.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    sha256 : str
+        Of the shape file.
+    """
+
+    mesh: Mesh
+    sha256: str
+
+
 def build(loaded: LoadedScenario) -> Built:
     """Make everything that a scenario describes.
 
@@ -75,14 +97,70 @@ def build(loaded: LoadedScenario) -> Built:
     InputRefused
         A value contradicts the mesh; it is named with its file, line and dotted key.
     """
-    scenario = loaded.scenario
+    return builder_over(read_surface(loaded))(loaded)
+
+
+def read_surface(loaded: LoadedScenario) -> Surface:
+    """Read the shape of a scenario.
+
+    Parameters
+    ----------
+    loaded : LoadedScenario
+        The scenario.
+
+    Returns
+    -------
+    Surface
+
+    Raises
+    ------
+    InputRefused
+        It is missing or broken; the scenario's key is named with its file and line.
+    """
     try:
-        asteroid, sha256 = build_asteroid(scenario, loaded.beside)
-        ellipsoid_m = resolve_ellipsoid(scenario.reach, asteroid.mesh) if scenario.reach else None
+        return _read_surface(loaded.scenario.body, loaded.beside)
     except KeyRefused as error:
-        problem = Problem(error.path, error.what, error.fix)
-        raise refusal([problem], loaded.places, loaded.source) from error
-    return Built(asteroid, build_spacecraft(scenario), ellipsoid_m, sha256)
+        raise _refused(error, loaded) from error
+
+
+def builder_over(surface: Surface) -> Callable[[LoadedScenario], Built]:
+    """Return what builds scenarios over one surface; equal bodies and ellipsoids are made once.
+
+    Parameters
+    ----------
+    surface : Surface
+        What the scenarios' ``body.shape``, ``length_unit`` and ``origin`` stand for.
+
+    Returns
+    -------
+    callable
+        From LoadedScenario to Built; raises as :func:`build` does.
+    """
+    bodies: dict[str, Asteroid] = {}
+    ellipsoids: dict[object, FloatArray] = {}
+
+    def build_one(loaded: LoadedScenario) -> Built:
+        scenario, reach = loaded.scenario, loaded.scenario.reach
+        body, about = scenario.name + scenario.body.model_dump_json(), _of_ellipsoid(reach)
+        try:
+            if body not in bodies:
+                bodies[body] = asteroid_over(scenario, surface.mesh)
+            if reach is not None and about not in ellipsoids:
+                ellipsoids[about] = resolve_ellipsoid(reach, surface.mesh)
+        except KeyRefused as error:
+            raise _refused(error, loaded) from error
+        return Built(bodies[body], build_spacecraft(scenario), ellipsoids.get(about), surface.sha256)
+
+    return build_one
+
+
+def _of_ellipsoid(reach: Reach | None) -> object:
+    """What the keep-out ellipsoid and its checks depend on beside the mesh."""
+    return reach and (reach.ellipsoid_m, tuple(state.start_m for state in reach.initial_states))
+
+
+def _refused(error: KeyRefused, loaded: LoadedScenario) -> InputRefused:
+    return refusal([Problem(error.path, error.what, error.fix)], loaded.places, loaded.source)
 
 
 def build_asteroid(scenario: Scenario, beside: Path) -> tuple[Asteroid, str]:
@@ -108,15 +186,42 @@ def build_asteroid(scenario: Scenario, beside: Path) -> tuple[Asteroid, str]:
     InputRefused
         The shape is missing or broken, or its size contradicts the unit or the mass.
     """
+    surface = _read_surface(scenario.body, beside)
+    return asteroid_over(scenario, surface.mesh), surface.sha256
+
+
+def asteroid_over(scenario: Scenario, mesh: Mesh) -> Asteroid:
+    """Make the asteroid of a scenario over a surface that was read already.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its ``body`` section says spin and gravity.
+    mesh : Mesh
+        About the scenario's origin.
+
+    Returns
+    -------
+    Asteroid
+
+    Raises
+    ------
+    InputRefused
+        The mesh contradicts the unit or the mass.
+    """
     body = scenario.body
+    gm_m3_s2 = _gravitational_parameter(body.gravity, mass_properties(mesh).volume_m3)
+    gravity = _gravity_field(body.gravity, gm_m3_s2, mesh)
+    return Asteroid(scenario.name, mesh, body.spin_rad_s, gravity, gm_m3_s2)
+
+
+def _read_surface(body: Body, beside: Path) -> Surface:
     try:
         shape = read_shape(find_shape(body.shape, beside), body.length_unit)
     except InputRefused as error:
         raise KeyRefused(("body", "shape"), f"{error.where}: {error.what}", error.fix) from error
     mesh = centred(shape.mesh) if body.origin == "center_of_mass" else shape.mesh
-    gm_m3_s2 = _gravitational_parameter(body.gravity, mass_properties(mesh).volume_m3)
-    gravity = _gravity_field(body.gravity, gm_m3_s2, mesh)
-    return Asteroid(scenario.name, mesh, body.spin_rad_s, gravity, gm_m3_s2), shape.sha256
+    return Surface(mesh, shape.sha256)
 
 
 def build_spacecraft(scenario: Scenario) -> Spacecraft:

@@ -127,7 +127,7 @@ def load_any(source: str, overrides: Sequence[str] = ()) -> LoadedScenario | Loa
 
 
 def load_document(
-    document: Document, source: str, beside: Path, overrides: Sequence[str] = ()
+    document: Document, source: str, beside: Path, overrides: Sequence[str] = (), option: str = "--set"
 ) -> LoadedScenario:
     """Override and check the values of a scenario that were read already.
 
@@ -141,6 +141,8 @@ def load_document(
         The folder where its shape is searched first.
     overrides : sequence of str
         ``dotted.key=value`` each.
+    option : str
+        The command-line option that they came from; for messages.
 
     Returns
     -------
@@ -151,26 +153,55 @@ def load_document(
     InputRefused
         What it says is wrong.
     """
-    document = _overridden(document, overrides)
+    document = _overridden(document, overrides, option)
     scenario = from_tree(document.tree, document.places, source)
     return Loaded(scenario, source, beside, document.places)
 
 
-def _overridden(document: Document, overrides: Sequence[str]) -> Document:
+def read_document(source: str, overrides: Sequence[str] = ()) -> tuple[Document, str, Path]:
+    """Read the values of a scenario that is overridden and checked later, more than once perhaps.
+
+    Parameters
+    ----------
+    source : str
+        As for `load`.
+    overrides : sequence of str
+        ``dotted.key=value`` each.
+
+    Returns
+    -------
+    Document
+        Its values with the overrides; unchecked.
+    str
+        What to call it in messages.
+    Path
+        The folder where its shape is searched first.
+
+    Raises
+    ------
+    InputRefused
+        The file cannot be read safely.
+    """
+    found = locate(source)
+    document = _overridden(parse(read_text(found), found.name), overrides)
+    return document, found.name, found.beside
+
+
+def _overridden(document: Document, overrides: Sequence[str], option: str = "--set") -> Document:
     for override in overrides:
-        document = _with_override(document, override)
+        document = _with_override(document, override, option)
     return document
 
 
-def _with_override(document: Document, override: str) -> Document:
+def _with_override(document: Document, override: str, option: str) -> Document:
     """Put one ``key=value`` of the command line into the values."""
     key, separator, text = override.partition("=")
     if not separator or not key:
         raise UsageError(
-            f"--set {shown(override)} is not of the form key=value",
-            fix="for instance --set reach.tof_s=900",
+            f"{option} {shown(override)} is not of the form key=value",
+            fix=f"for instance {option} reach.tof_s=900",
         )
-    origin = f"--set {override if len(override) <= 80 else override[:77] + '...'}"
+    origin = f"{option} {override if len(override) <= 80 else override[:77] + '...'}"
     try:
         value = parse(text, origin).tree if text.strip() else None
     except InputRefused as error:

@@ -76,6 +76,8 @@ def _create(place: h5py.Group, name: str, dataset: Dataset) -> h5py.Dataset:
     made = place.create_dataset(name, data=data, track_times=False, **options)
     _set_attribute(made, "units", dataset.units)
     _set_attribute(made, "description", dataset.description)
+    if dataset.data.dtype.kind == "U":
+        _set_attribute(made, "_Encoding", "utf-8")  # or xarray takes words for bytes
     if dataset.flags is not None:
         _put(made, "flag_values", np.array(list(dataset.flags), dtype=data.dtype))
         _set_attribute(made, "flag_meanings", " ".join(dataset.flags.values()))

@@ -13,7 +13,14 @@ from landing_cli.results.tree import Attribute, Dataset, Group, canonical_attrib
 DEEPEST = 12
 MOST_OBJECTS = 100_000
 LARGEST_ATTRIBUTE_BYTES = 1 << 24
-INTERNAL_ATTRIBUTES = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "DIMENSION_LABELS"}
+INTERNAL_ATTRIBUTES = {
+    "CLASS",
+    "NAME",
+    "DIMENSION_LIST",
+    "REFERENCE_LIST",
+    "DIMENSION_LABELS",
+    "_Encoding",
+}
 OWN_ATTRIBUTES = {"units", "description", "flag_values", "flag_meanings"}
 
 

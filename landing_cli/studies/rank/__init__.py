@@ -1,0 +1,1 @@
+"""`reach rank`: landing sites of a reach run in order of a stated score."""
