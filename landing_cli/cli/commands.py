@@ -7,11 +7,12 @@ from typing import Any
 
 import typer
 
-from landing_cli.cli import observe, plan, reach, results, scenario, shapes, tour
+from landing_cli.cli import disperse, observe, plan, reach, results, scenario, shapes, tour
 from landing_cli.cli.options import new_program
 from landing_cli.errors import ExitCode
 
 plan.app.command("observe")(observe.observe)
+reach.app.command("disperse")(disperse.disperse)
 
 # console script -> its commands
 MISSIONS: dict[str, typer.Typer] = {

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from landing_cli.cli import console, observe, plan, reach, tour
+from landing_cli.cli import console, disperse, observe, plan, reach, tour
 from landing_cli.cli.options import Force, Jobs, Json, Output, Quiet, ResultFile, new_group
 from landing_cli.errors import InputRefused, OutputRefused, UsageError, VerificationFailed
 
@@ -22,7 +22,13 @@ if TYPE_CHECKING:
 app = new_group("Look at, export, draw, verify and compare result files.")
 
 # missions whose results this version reads: how to print them; each brings stored, figures, verify
-MISSIONS: dict[str, ModuleType] = {"reach": reach, "plan": plan, "observe": observe, "tour": tour}
+MISSIONS: dict[str, ModuleType] = {
+    "reach": reach,
+    "plan": plan,
+    "observe": observe,
+    "tour": tour,
+    "dispersion": disperse,
+}
 
 CaseName = Annotated[
     str | None,
@@ -45,6 +51,7 @@ class ExportedTable(StrEnum):
     FLYBYS = "flybys"
     LANDMARKS = "landmarks"
     VIEW = "view"
+    SAMPLES = "samples"
 
 
 class ExportFormat(StrEnum):

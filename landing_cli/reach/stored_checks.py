@@ -54,15 +54,20 @@ def check_case(result: CaseResult) -> None:
         raise ValueError("glide_slope_half_angle_rad is not between 0 and pi/2")
     for name in ("position_m", "velocity_m_s"):
         bounded(name, getattr(case, name), _LARGEST[name])
-    for name, allowed in _CHOICES.items():
-        if getattr(case, name) not in allowed:
-            raise ValueError(f"{name} is none of {', '.join(allowed)}")
+    check_choices(case)
     check_rows(result.solutions, facets)
     _all_within("lost", np.array(list(result.lost), dtype=np.int64), facets)
     if result.boundary is not None:
         _check_boundary(result.boundary, facets)
-    _check_printable("summary", result.summary)
-    _check_summary(result.summary, summarise(case.asteroid.mesh, result.solutions))
+    check_printable("summary", result.summary)
+    check_summary(result.summary, summarise(case.asteroid.mesh, result.solutions))
+
+
+def check_choices(case: LandingCase) -> None:
+    """Hold the words of a case to those that are known, or raise ValueError."""
+    for name, allowed in _CHOICES.items():
+        if getattr(case, name) not in allowed:
+            raise ValueError(f"{name} is none of {', '.join(allowed)}")
 
 
 def check_rows(solutions: FacetSolutions, facets: int) -> None:
@@ -106,8 +111,8 @@ def _check_boundary(boundary: Group, facets: int) -> None:
             _all_within(f"boundary/{name}", member.data, facets)
 
 
-def _check_summary(stored: Mapping[str, Any], known: Mapping[str, Any], path: str = "summary") -> None:
-    """Every number that is printed is there, and is a number."""
+def check_summary(stored: Mapping[str, Any], known: Mapping[str, Any], path: str = "summary") -> None:
+    """Hold a summary to the numbers that are printed of it, or raise ValueError."""
     for name, value in known.items():
         if name not in stored:
             raise ValueError(f"{path} lacks {name}")
@@ -115,16 +120,16 @@ def _check_summary(stored: Mapping[str, Any], known: Mapping[str, Any], path: st
         if isinstance(value, Mapping):
             if not isinstance(found, Mapping):
                 raise ValueError(f"{path}/{name} is no group")
-            _check_summary(found, value, f"{path}/{name}")
+            check_summary(found, value, f"{path}/{name}")
         elif not (found is None or isinstance(found, int | float)):
             raise ValueError(f"{path}/{name} is no number")
 
 
-def _check_printable(path: str, values: Mapping[str, Any]) -> None:
-    """Nothing but numbers, words and groups of them."""
+def check_printable(path: str, values: Mapping[str, Any]) -> None:
+    """Hold a summary to numbers, words and groups of them, or raise ValueError."""
     for name, value in values.items():
         if isinstance(value, Mapping):
-            _check_printable(f"{path}/{name}", value)
+            check_printable(f"{path}/{name}", value)
         elif not (value is None or isinstance(value, int | float | str)):
             raise ValueError(f"{path}/{name} is neither number nor word")
 

@@ -21,6 +21,7 @@ from landing_cli.scenario.schema_base import (
     wrong,
 )
 from landing_cli.scenario.schema_body import Body
+from landing_cli.scenario.schema_disperse import DisperseSection
 from landing_cli.scenario.schema_observe import ObserveSection
 from landing_cli.scenario.schema_plan import PlanSection
 from landing_cli.scenario.schema_tour import TourScenario
@@ -204,6 +205,9 @@ class Scenario(Section):
     plan: PlanSection | None = Field(None, description="the flight to one site: `plan bezier` and others")
     observe: ObserveSection | None = Field(
         None, description="the landing that sees its landmarks: `plan observe`"
+    )
+    disperse: DisperseSection | None = Field(
+        None, description="what is not known exactly, and how well it is known: `reach disperse`"
     )
 
     def model_post_init(self, context: Any, /) -> None:

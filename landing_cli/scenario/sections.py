@@ -6,10 +6,16 @@ from landing_cli.errors import InputRefused
 from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.messages import Problem, refusal
 from landing_cli.scenario.schema import Reach, Scenario
+from landing_cli.scenario.schema_disperse import DisperseSection
 from landing_cli.scenario.schema_observe import ObserveSection
 from landing_cli.scenario.schema_plan import PlanSection
 
-MISSIONS = ("reach", "plan", "observe")
+MISSIONS = (
+    "reach",
+    "plan",
+    "observe",
+    "disperse",
+)
 
 
 def reach_section(loaded: LoadedScenario) -> Reach:
@@ -79,21 +85,46 @@ def observe_section(loaded: LoadedScenario) -> ObserveSection:
     return loaded.scenario.observe
 
 
-def for_mission(scenario: Scenario, mission: str) -> Scenario:
+def disperse_section(loaded: LoadedScenario) -> DisperseSection:
+    """Return what a scenario says for ``reach disperse``.
+
+    Parameters
+    ----------
+    loaded : LoadedScenario
+        The checked scenario.
+
+    Returns
+    -------
+    DisperseSection
+
+    Raises
+    ------
+    InputRefused
+        It has no such section, or that one disperses nothing.
+    """
+    fix = "`reach disperse` needs position_sigma_m, velocity_sigma_m_s, thrust_sigma_relative, ... there"
+    if loaded.scenario.disperse is None:
+        raise _missing(loaded, "disperse", fix)
+    if not loaded.scenario.disperse.disperses:
+        raise refusal([Problem(("disperse",), "disperses nothing", fix)], loaded.places, loaded.source)
+    return loaded.scenario.disperse
+
+
+def for_mission(scenario: Scenario, *missions: str) -> Scenario:
     """Drop the sections of other missions: what they say changes no number of this one.
 
     Parameters
     ----------
     scenario : Scenario
         All of it.
-    mission : {"reach", "plan", "observe"}
-        Whose section stays.
+    *missions : {"reach", "plan", "observe", "disperse"}
+        Whose sections stay.
 
     Returns
     -------
     Scenario
     """
-    return scenario.model_copy(update={name: None for name in MISSIONS if name != mission})
+    return scenario.model_copy(update={name: None for name in MISSIONS if name not in missions})
 
 
 def _missing(loaded: LoadedScenario, name: str, fix: str) -> InputRefused:

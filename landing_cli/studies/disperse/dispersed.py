@@ -1,0 +1,109 @@
+"""A landing case with a sample's deviations, ready for the solver."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from landing_cli.body.gravity.scaled_field import scaled_field
+from landing_cli.errors import InputRefused
+from landing_cli.reach.certificate import GravityBounds
+from landing_cli.reach.free_descent import PreparedCase, prepare
+from landing_cli.reach.records import LandingCase
+from landing_cli.studies.disperse.records import Axes, FloatArray
+
+# Slower than this, over the speed of the surface below, a start has no direction of motion.
+_AT_REST = 1e-9
+
+
+def state_axes(case: LandingCase, axes: Axes) -> FloatArray:
+    """Return the axes that a case's state is dispersed along.
+
+    Parameters
+    ----------
+    case : LandingCase
+        Without deviation.
+    axes : {"body", "radial_along_cross"}
+        Body axes; or radial (away from the origin), along (the inertial velocity's part across the radius)
+        and cross (radial times along).
+
+    Returns
+    -------
+    (3, 3) float
+        Rows: unit vectors in the body frame.
+
+    Raises
+    ------
+    InputRefused
+        The initial state has no direction of motion across the radius.
+    """
+    if axes == "body":
+        return np.eye(3)
+    r, spin = case.position_m, case.asteroid.rotation_rate_rad_s
+    radial = r / np.linalg.norm(r)
+    inertial = case.velocity_m_s + np.cross([0.0, 0.0, spin], r)
+    across = inertial - (inertial @ radial) * radial
+    speed = float(np.linalg.norm(across))
+    if not speed > _AT_REST * (np.linalg.norm(case.velocity_m_s) + spin * np.linalg.norm(r)):
+        raise InputRefused(
+            f"{case.name} does not move across the radius in inertial space: it has no along and no cross",
+            where="disperse.axes",
+            fix="take body axes",
+        )
+    along = across / speed
+    return np.stack([radial, along, np.cross(radial, along)])
+
+
+def dispersed_case(case: LandingCase, turn: FloatArray, deviation: FloatArray) -> LandingCase:
+    """Add a sample's deviations to a case; mesh and ellipsoid stay, and the propellant on board.
+
+    Parameters
+    ----------
+    case : LandingCase
+        Without deviation.
+    turn : (3, 3) float
+        From :func:`state_axes`.
+    deviation : (9,) float, SI
+        From `draws.deviations`.
+
+    Returns
+    -------
+    LandingCase
+        All zero, it is the case itself to the last bit.
+    """
+    asteroid, craft = case.asteroid, case.spacecraft
+    gm_m3_s2 = asteroid.gm_m3_s2 + float(deviation[8])
+    gravity = scaled_field(asteroid.gravity, gm_m3_s2 / asteroid.gm_m3_s2)
+    return replace(
+        case,
+        asteroid=replace(asteroid, gravity=gravity, gm_m3_s2=gm_m3_s2),
+        spacecraft=replace(
+            craft,
+            mass_kg=craft.mass_kg + float(deviation[6]),
+            thrust_max_n=craft.thrust_max_n + float(deviation[7]),
+        ),
+        position_m=case.position_m + turn.T @ deviation[:3],
+        velocity_m_s=case.velocity_m_s + turn.T @ deviation[3:6],
+    )
+
+
+def prepare_dispersed(nominal: PreparedCase, case: LandingCase) -> PreparedCase:
+    """Prepare a dispersed case on what was surveyed once, for the nominal one.
+
+    Parameters
+    ----------
+    nominal : PreparedCase
+        The case without deviation.
+    case : LandingCase
+        From :func:`dispersed_case`.
+
+    Returns
+    -------
+    PreparedCase
+        The bounds of gravity are those of the nominal field, scaled as the field is.
+    """
+    factor = case.asteroid.gm_m3_s2 / nominal.case.asteroid.gm_m3_s2
+    bounds = nominal.shared.bounds
+    scaled = GravityBounds(bounds.radius_m, factor * bounds.outside_m_s2, factor * bounds.on_arcs_m_s2)
+    return prepare(case, replace(nominal.shared, bounds=scaled))
