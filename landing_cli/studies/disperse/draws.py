@@ -12,7 +12,8 @@ import numpy as np
 
 from landing_cli.studies.disperse.records import DRAWN, FloatArray, Spread
 
-_MANTISSA_BITS = 53
+# One less than a double holds: with the half added, no share rounds up to 1.
+_BITS = 52
 
 
 def standard_normals(seed: int, samples: int) -> FloatArray:
@@ -33,7 +34,7 @@ def standard_normals(seed: int, samples: int) -> FloatArray:
     from scipy.special import ndtri
 
     raw = np.stack([_raw(seed, sample) for sample in range(samples)])
-    shares = ((raw >> np.uint64(64 - _MANTISSA_BITS)).astype(np.float64) + 0.5) * 2.0**-_MANTISSA_BITS
+    shares = ((raw >> np.uint64(64 - _BITS)).astype(np.float64) + 0.5) * 2.0**-_BITS
     return np.asarray(ndtri(shares))
 
 
