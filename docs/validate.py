@@ -13,6 +13,7 @@ from landing_cli.parallel.plan import WorkPlan
 
 pin_blas_threads()
 
+from validation_disperse import dispersed_starts  # noqa: E402
 from validation_domain import Runs, domains, draw_delta_v, facts, verification  # noqa: E402
 from validation_observe import observed_landings  # noqa: E402
 from validation_plan import landing_plans  # noqa: E402
@@ -89,6 +90,8 @@ def main() -> None:
     parts.append(observed_landings())
     say("tours of asteroids")
     parts.append(flyby_tours(say))
+    say("dispersed starts")
+    parts.append(dispersed_starts(runs["bennu"], images, say))
     (DOCS / "validation.md").write_text(page(parts), encoding="utf-8")
     say(f"wrote {DOCS / 'validation.md'}")
 

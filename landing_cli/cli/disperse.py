@@ -27,8 +27,8 @@ from landing_cli.cli.options import (
 from landing_cli.errors import NothingFeasible, PartialResult
 
 if TYPE_CHECKING:
-    from landing_cli.studies.disperse.pipeline import Request
     from landing_cli.studies.disperse.records import CaseDispersion, DispersionRun
+    from landing_cli.studies.disperse.request import Request
     from landing_cli.studies.disperse.verify import DispersionReport
 
 # where `landing results` finds stored, exports, figures and verify
@@ -107,7 +107,7 @@ def disperse(
 
     reach_section(loaded), disperse_section(loaded)  # before the solver is imported
     if dry_run:
-        from landing_cli.studies.disperse.pipeline import request_of
+        from landing_cli.studies.disperse.request import request_of
 
         _say_plan(request_of(loaded), path, as_json)
         return

@@ -15,7 +15,7 @@ from landing_cli.scenario.load import load
 from landing_cli.scenario.schema import from_tree, json_schema, to_tree
 from landing_cli.scenario.sections import for_mission
 from landing_cli.scenario.show import to_yaml
-from landing_cli.studies.disperse.pipeline import request_of
+from landing_cli.studies.disperse.request import request_of
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 COVARIANCE = random_covariance().tolist()
@@ -117,3 +117,5 @@ def test_the_schema_and_the_shipped_scenario_know_it(capsys: pytest.CaptureFixtu
     assert loaded.scenario.disperse is not None
     assert main("landing", ["scenario", "show", str(ROOT / "configs" / "bennu.yaml")]) == 0
     assert "thrust_sigma_relative: 0.02" in capsys.readouterr().out
+    assert main("landing", ["scenario", "check", str(ROOT / "configs" / "bennu.yaml")]) == 0
+    assert "thrust 0.4, gm 0.04892" in " ".join(capsys.readouterr().out.split())

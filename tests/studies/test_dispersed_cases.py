@@ -27,7 +27,8 @@ from landing_cli.reach.certificate import gravity_bounds
 from landing_cli.reach.free_descent import prepare, solve_prepared, solve_verdicts, survey
 from landing_cli.reach.margin import thrust_levels
 from landing_cli.reach.records import LandingCase, Verdict
-from landing_cli.studies.disperse.dispersed import dispersed_case, prepare_dispersed, state_axes
+from landing_cli.studies.disperse.axes import state_axes
+from landing_cli.studies.disperse.dispersed import dispersed_case, prepare_dispersed
 from landing_cli.studies.disperse.draws import deviations, standard_normals
 from landing_cli.studies.disperse.pair_work import PairWork, in_chunks, verdicts_of
 from landing_cli.studies.disperse.statistics import facet_rows

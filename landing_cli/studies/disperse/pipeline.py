@@ -11,7 +11,6 @@ import numpy as np
 
 from landing_cli import __version__
 from landing_cli.parallel import WorkPlan
-from landing_cli.reach.cases import landing_cases
 from landing_cli.reach.free_descent import prepare, survey
 from landing_cli.reach.kernels import are_compiled, compile_parts
 from landing_cli.reach.pipeline import COMPILING, COMPILING_FACETS
@@ -20,14 +19,10 @@ from landing_cli.results.identity import RunIdentity
 from landing_cli.results.output import finish_output, open_output
 from landing_cli.results.provenance import Stopwatch
 from landing_cli.results.store import read
-from landing_cli.scenario.build import Built, build
 from landing_cli.scenario.load import LoadedScenario
-from landing_cli.scenario.messages import Problem, refusal
-from landing_cli.scenario.schema import Reach
-from landing_cli.scenario.schema_disperse import LARGEST_RELATIVE, DisperseSection
-from landing_cli.scenario.sections import disperse_section, for_mission, reach_section
+from landing_cli.scenario.sections import for_mission
 from landing_cli.scenario.show import to_yaml
-from landing_cli.studies.disperse.dispersed import state_axes
+from landing_cli.studies.disperse.axes import state_axes
 from landing_cli.studies.disperse.draws import deviations, standard_normals
 from landing_cli.studies.disperse.pair_work import CHUNK_PAIRS, PairWork, in_chunks, verdicts_of
 from landing_cli.studies.disperse.recorded import solve_recorded
@@ -36,9 +31,9 @@ from landing_cli.studies.disperse.records import (
     DispersionRun,
     Drawing,
     FloatArray,
-    Spread,
     Verdicts,
 )
+from landing_cli.studies.disperse.request import Request, request_of
 from landing_cli.studies.disperse.statistics import facet_rows
 from landing_cli.studies.disperse.stored import MISSION, run_from_result, run_to_tree
 from landing_cli.studies.disperse.summary import count_domains, sample_rows, summarise
@@ -61,117 +56,6 @@ class Outcome:
 
     run: DispersionRun
     up_to_date: bool
-
-
-@dataclass(frozen=True, eq=False)
-class Request:
-    """What a scenario asks of a dispersion.
-
-    Attributes
-    ----------
-    loaded : LoadedScenario
-    built : Built
-    cases : tuple of (str, LandingCase)
-        Those to disperse, each with the name of its initial state.
-    drawing : Drawing
-    """
-
-    loaded: LoadedScenario
-    built: Built
-    cases: tuple[tuple[str, LandingCase], ...]
-    drawing: Drawing
-
-
-def request_of(loaded: LoadedScenario) -> Request:
-    """Make what a scenario asks for.
-
-    Parameters
-    ----------
-    loaded : LoadedScenario
-        The checked scenario.
-
-    Returns
-    -------
-    Request
-
-    Raises
-    ------
-    InputRefused
-        It lacks a section, or contradicts its mesh or itself.
-    """
-    reach, section = reach_section(loaded), disperse_section(loaded)
-    chosen = _chosen(loaded, reach, section)
-    built = build(loaded)
-    spread = spread_of(section, built, loaded)
-    cases = tuple(case for case in landing_cases(reach, built) if case[1].name in chosen)
-    for _, case in cases:
-        state_axes(case, spread.axes)  # refused before anything is written
-    return Request(loaded, built, cases, Drawing(section.seed, section.samples, section.confidence, spread))
-
-
-def _chosen(loaded: LoadedScenario, reach: Reach, section: DisperseSection) -> list[str]:
-    """Names of the cases to disperse."""
-    names = [name for name, _, _ in reach.cases()]
-    if section.cases is None:
-        return names
-    for index, name in enumerate(section.cases):
-        if name not in names:
-            problem = Problem(
-                ("disperse", "cases", index), f"no case '{name}'", f"take of {', '.join(names)}"
-            )
-            raise refusal([problem], loaded.places, loaded.source)
-    return list(section.cases)
-
-
-def spread_of(section: DisperseSection, built: Built, loaded: LoadedScenario) -> Spread:
-    """Make the sigmas of a scenario absolute.
-
-    Parameters
-    ----------
-    section : DisperseSection
-        What it says.
-    built : Built
-        Mass, thrust and GM without deviation.
-    loaded : LoadedScenario
-        For messages.
-
-    Returns
-    -------
-    Spread
-
-    Raises
-    ------
-    InputRefused
-        An absolute sigma is more than a tenth of its quantity, or the mass may fall to the propellant's.
-    """
-    craft = built.spacecraft
-    mass = _absolute("mass_sigma_kg", section.mass_sigma_relative, craft.mass_kg, section, loaded)
-    thrust = _absolute("thrust_sigma_n", section.thrust_sigma_relative, craft.thrust_max_n, section, loaded)
-    gm = _absolute("gm_sigma_m3_s2", section.gm_sigma_relative, built.asteroid.gm_m3_s2, section, loaded)
-    if craft.propellant_kg is not None and craft.mass_kg - FARTHEST_SIGMAS * mass <= craft.propellant_kg:
-        key = "mass_sigma_kg" if section.mass_sigma_relative is None else "mass_sigma_relative"
-        told = f"draws of {FARTHEST_SIGMAS:g} sigma leave less mass than spacecraft.propellant_kg"
-        raise _refused(loaded, key, told, "the propellant on board is not dispersed: lower the sigma")
-    return Spread(section.axes, np.array(section.state_factor()), mass, thrust, gm)
-
-
-FARTHEST_SIGMAS = 8.3
-
-
-def _absolute(
-    key: str, relative: float | None, nominal: float, section: DisperseSection, loaded: LoadedScenario
-) -> float:
-    if relative is not None:
-        return relative * nominal
-    sigma = float(getattr(section, key) or 0.0)
-    if sigma > LARGEST_RELATIVE * nominal:
-        told = f"{sigma:g} is more than a tenth of {nominal:g}"
-        raise _refused(loaded, key, told, "check the unit: a normal that wide draws negative ones")
-    return sigma
-
-
-def _refused(loaded: LoadedScenario, key: str, what: str, fix: str) -> Exception:
-    return refusal([Problem(("disperse", key), what, fix)], loaded.places, loaded.source)
 
 
 def run(

@@ -68,7 +68,7 @@ class Spread:
     Attributes
     ----------
     axes : {"body", "radial_along_cross"}
-        Along which the state's deviations are given; see `dispersed.state_axes`.
+        Along which the state's deviations are given; see `axes.state_axes`.
     state_factor : (6, 6) float, m and m/s
         Lower triangular L; the covariance of position and velocity is L L'.
     mass_sigma_kg, thrust_sigma_n, gm_sigma_m3_s2 : float

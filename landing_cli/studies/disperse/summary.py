@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from landing_cli.body.mesh import facet_areas
 from landing_cli.reach.records import LandingCase, Verdict
-from landing_cli.studies.disperse.dispersed import dispersed_case, state_axes
+from landing_cli.studies.disperse.axes import state_axes
+from landing_cli.studies.disperse.dispersed import dispersed_case
 from landing_cli.studies.disperse.records import (
     SAMPLE_COLUMNS,
     Drawing,

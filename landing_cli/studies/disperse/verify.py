@@ -25,7 +25,8 @@ from landing_cli.reach.reflight import Ground, measure_rows
 from landing_cli.reach.stored import CaseResult
 from landing_cli.reach.verify import LIMITS
 from landing_cli.results.verification import Check, Report
-from landing_cli.studies.disperse.dispersed import dispersed_case, prepare_dispersed, state_axes
+from landing_cli.studies.disperse.axes import state_axes
+from landing_cli.studies.disperse.dispersed import dispersed_case, prepare_dispersed
 from landing_cli.studies.disperse.draws import deviations, standard_normals
 from landing_cli.studies.disperse.records import CaseDispersion, FloatArray
 from landing_cli.studies.disperse.statistics import facet_rows, verdict_correlations

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 # Probabilities that lines are drawn at: half, and one in twenty to either side.
 EDGES, HALF = (0.05, 0.95), (0.5,)
-_EDGE_LOOK = {"colors": "white", "linewidths": 0.9, "zorder": 3}
+_EDGE_LOOK = {"colors": plotting.ORANGE, "linewidths": 1.0, "zorder": 3}
 _HALF_LOOK = {"colors": plotting.INK, "linewidths": 1.3, "zorder": 4}
 
 
@@ -107,7 +107,7 @@ def _explain(figure: Figure, scale: ScalarMappable) -> None:
     bar.outline.set_visible(False)
     handles = [
         Line2D([], [], color=plotting.INK, lw=1.3, label="one half"),
-        Line2D([], [], color=plotting.GREY, lw=1.2, label="5 % and 95 % (drawn in white)"),
+        Line2D([], [], color=plotting.ORANGE, lw=1.0, label="5 % and 95 %"),
         Line2D([], [], **{**START, "markersize": 10}, label="initial position, not dispersed"),
     ]
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.685, 0.335), labelspacing=0.7)
