@@ -149,6 +149,15 @@ def test_verdicts_alone_are_those_of_the_full_solve(changes: dict[str, Any]) -> 
         assert {Verdict.REACHABLE} < set(full.tolist())
 
 
+def test_a_start_inside_the_ellipsoid_reaches_nothing() -> None:
+    case = landing_case(asteroid(SMALL), position_m=np.array([0.0, 0.0, 235.0]))
+    prepared, facets = prepare(case, survey(case)), np.arange(0, 80, 5)
+    assert set(solve_prepared(prepared, facets).rows["verdict"].tolist()) == {Verdict.UNREACHABLE}
+    for height in (235.0, 1.0):
+        inside = replace(prepared, case=replace(case, position_m=np.array([0.0, 0.0, height])))
+        assert set(verdicts_of(inside, facets).tolist()) == {Verdict.UNREACHABLE}
+
+
 def test_verdicts_of_extremals_are_those_of_a_reach_run() -> None:
     from landing_cli.reach.facet_work import solve_items
 

@@ -10,6 +10,9 @@ from landing_cli.reach.free_descent import PreparedCase, prepare
 from landing_cli.reach.records import LandingCase
 from landing_cli.studies.disperse.records import FloatArray
 
+# r'Re r below 1 by more than this is no rounding: limits are met to a tenth of it.
+_INSIDE = 1e-4
+
 
 def dispersed_case(case: LandingCase, turn: FloatArray, deviation: FloatArray) -> LandingCase:
     """Add a sample's deviations to a case; mesh and ellipsoid stay, and the propellant on board.
@@ -63,3 +66,8 @@ def prepare_dispersed(nominal: PreparedCase, case: LandingCase) -> PreparedCase:
     bounds = nominal.shared.bounds
     scaled = GravityBounds(bounds.radius_m, factor * bounds.outside_m_s2, factor * bounds.on_arcs_m_s2)
     return prepare(case, replace(nominal.shared, bounds=scaled))
+
+
+def begins_inside(case: LandingCase) -> bool:
+    """Whether a case begins inside the keep-out ellipsoid by more than any tolerance: no flight mends that."""
+    return float(((case.position_m / case.ellipsoid_m) ** 2).sum()) < 1.0 - _INSIDE

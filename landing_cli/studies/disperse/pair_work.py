@@ -13,7 +13,8 @@ import numpy as np
 
 from landing_cli.reach.facet_work import solve_items
 from landing_cli.reach.free_descent import PreparedCase, solve_verdicts
-from landing_cli.studies.disperse.dispersed import dispersed_case, prepare_dispersed
+from landing_cli.reach.records import Verdict
+from landing_cli.studies.disperse.dispersed import begins_inside, dispersed_case, prepare_dispersed
 from landing_cli.studies.disperse.records import FloatArray, Verdicts
 
 CHUNK_PAIRS = 1024
@@ -81,7 +82,12 @@ class PairWork:
 
 
 def verdicts_of(prepared: PreparedCase, facets: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Verdicts:
-    """Find the verdicts of ascending facets of a prepared case, as `reach run` does."""
+    """Find the verdicts of ascending facets of a prepared case, as `reach run` does.
+
+    A case that begins inside the keep-out ellipsoid reaches nothing; that is not left to the solver.
+    """
+    if begins_inside(prepared.case):
+        return np.full(len(facets), Verdict.UNREACHABLE, dtype=np.uint8)
     if prepared.case.descent == "free":
         return solve_verdicts(prepared, facets)
     solved = solve_items((prepared,), len(prepared.shared.centroids_m), facets)

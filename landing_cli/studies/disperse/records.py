@@ -50,8 +50,10 @@ class Driver(IntEnum):
             return "nothing"
         if self >= Driver.MASS:
             return {Driver.MASS: "the mass", Driver.THRUST: "the thrust"}.get(self, "GM")
-        what, axis = self.name.split("_")
-        return f"the {what.lower()} {axis.lower() if len(axis) > 1 else f'along {axis.lower()}'}"
+        what, axis = self.name.lower().split("_")
+        if axis in "xyz":
+            return f"the {what} along {axis}"
+        return f"the {axis if axis == 'radial' else f'{axis}-track'} {what}"
 
 
 def drivers_of(axes: Axes) -> tuple[Driver, ...]:

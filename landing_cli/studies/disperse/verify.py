@@ -26,7 +26,7 @@ from landing_cli.reach.stored import CaseResult
 from landing_cli.reach.verify import LIMITS
 from landing_cli.results.verification import Check, Report
 from landing_cli.studies.disperse.axes import state_axes
-from landing_cli.studies.disperse.dispersed import dispersed_case, prepare_dispersed
+from landing_cli.studies.disperse.dispersed import begins_inside, dispersed_case, prepare_dispersed
 from landing_cli.studies.disperse.draws import deviations, standard_normals
 from landing_cli.studies.disperse.records import CaseDispersion, FloatArray
 from landing_cli.studies.disperse.statistics import facet_rows, verdict_correlations
@@ -184,6 +184,10 @@ def _solve_again(
     sample = int(samples[0])
     turn = state_axes(result.case, result.drawing.spread.axes)
     case = dispersed_case(result.case, turn, drawn[sample])
+    if begins_inside(case):
+        return _Again(
+            sample, facets[result.verdicts[sample, facets] == Verdict.REACHABLE], {}, len(facets), 0
+        )
     solved = solve_items((prepare_dispersed(nominal, case),), len(result.facets), facets)
     stored = result.verdicts[sample, facets].copy()
     asked = np.array([(sample, facet) not in result.lost for facet in facets.tolist()])
