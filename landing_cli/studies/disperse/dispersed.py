@@ -69,5 +69,5 @@ def prepare_dispersed(nominal: PreparedCase, case: LandingCase) -> PreparedCase:
 
 
 def begins_inside(case: LandingCase) -> bool:
-    """Whether a case begins inside the keep-out ellipsoid by more than any tolerance: no flight mends that."""
+    """Whether a case begins inside the keep-out ellipsoid by more than any tolerance; no flight mends it."""
     return float(((case.position_m / case.ellipsoid_m) ** 2).sum()) < 1.0 - _INSIDE
