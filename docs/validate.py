@@ -13,6 +13,7 @@ from landing_cli.parallel.plan import WorkPlan
 
 pin_blas_threads()
 
+from validation_disperse import dispersed_starts  # noqa: E402
 from validation_domain import Runs, domains, draw_delta_v, facts, verification  # noqa: E402
 from validation_isochrone import isochrones  # noqa: E402
 from validation_observe import observed_landings  # noqa: E402
@@ -99,6 +100,8 @@ def main() -> None:
     say("grids of domains, sites in order")
     swept_to = ROOT / "runs" / "bennu-reach-sweep.h5"
     parts.append(grids_and_sites(runs, ROOT / "configs" / "bennu.yaml", swept_to, images, say))
+    say("dispersed starts")
+    parts.append(dispersed_starts(runs["bennu"], images, say))
     (DOCS / "validation.md").write_text(page(parts), encoding="utf-8")
     say(f"wrote {DOCS / 'validation.md'}")
 

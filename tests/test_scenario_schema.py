@@ -88,6 +88,11 @@ def test_every_key_is_described_and_carries_its_unit() -> None:
         "weight",
         "absolute_magnitude_max",
         "albedo",
+        "confidence",
+        "covariance",  # its description tells the three units
+        "mass_sigma_relative",
+        "thrust_sigma_relative",
+        "gm_sigma_relative",
     }
     for definition in schema["$defs"].values():
         for key, value in definition["properties"].items():

@@ -7,7 +7,19 @@ from typing import Any
 
 import typer
 
-from landing_cli.cli import isochrone, observe, plan, rank, reach, results, scenario, shapes, sweep, tour
+from landing_cli.cli import (
+    disperse,
+    isochrone,
+    observe,
+    plan,
+    rank,
+    reach,
+    results,
+    scenario,
+    shapes,
+    sweep,
+    tour,
+)
 from landing_cli.cli.options import new_program
 from landing_cli.errors import ExitCode
 
@@ -15,6 +27,7 @@ plan.app.command("observe")(observe.observe)
 reach.app.command("isochrone")(isochrone.isochrone)
 reach.app.command("sweep")(sweep.sweep)
 reach.app.command("rank")(rank.rank)
+reach.app.command("disperse")(disperse.disperse)
 
 # console script -> its commands
 MISSIONS: dict[str, typer.Typer] = {

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from landing_cli.cli import console, isochrone, observe, plan, reach, sweep, tour
+from landing_cli.cli import console, disperse, isochrone, observe, plan, reach, sweep, tour
 from landing_cli.cli.comparison import Comparison
 from landing_cli.cli.options import Force, Jobs, Json, Output, Quiet, ResultFile, new_group
 from landing_cli.errors import InputRefused, OutputRefused, UsageError, VerificationFailed
@@ -30,6 +30,7 @@ MISSIONS: dict[str, ModuleType] = {
     "tour": tour,
     "isochrone": isochrone,
     "sweep": sweep,
+    "dispersion": disperse,
 }
 
 CaseName = Annotated[
@@ -57,6 +58,7 @@ class ExportedTable(StrEnum):
     INTERVALS = "intervals"
     DOMAIN = "domain"
     GROWTH = "growth"
+    SAMPLES = "samples"
 
 
 class ExportFormat(StrEnum):

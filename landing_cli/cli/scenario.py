@@ -118,6 +118,7 @@ def _landing_facts(loaded: LoadedScenario) -> dict[str, object]:
         **_reach_facts(loaded.scenario, built),
         **_plan_facts(loaded, built),
         **_observe_facts(loaded, built),
+        **_disperse_facts(loaded, built),
         "shape_sha256": built.shape_sha256,
     }
 
@@ -135,6 +136,22 @@ def _reach_facts(scenario: Scenario, built: Built) -> dict[str, object]:
     return {
         "ellipsoid_m": [round(float(axis), 3) for axis in built.ellipsoid_m],
         "cases": [name for name, _, _ in scenario.reach.cases()],
+    }
+
+
+def _disperse_facts(loaded: LoadedScenario, built: Built) -> dict[str, object]:
+    """Check the dispersion section against body and spacecraft, and tell one sigma of each quantity."""
+    if loaded.scenario.disperse is None or loaded.scenario.reach is None:
+        return {}
+    from landing_cli.studies.disperse.records import drivers_of
+    from landing_cli.studies.disperse.request import request_of
+
+    request = request_of(loaded, built)
+    spread = request.drawing.spread
+    sigmas = zip(drivers_of(spread.axes), spread.sigmas.tolist(), strict=True)
+    return {
+        "dispersed_cases": [case.name for _, case in request.cases],
+        "dispersed_sigmas": [f"{driver.name.lower()} {sigma:.5g}" for driver, sigma in sigmas],
     }
 
 

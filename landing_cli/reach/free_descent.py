@@ -9,7 +9,8 @@ so a facet that comes out just above 1 without a proof is asked again on a finer
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.adjacency import mean_edge_m
 from landing_cli.body.bvh import SurfaceIndex, build_surface_index
-from landing_cli.body.mesh import facet_centroids, facet_normals
+from landing_cli.body.mesh import Mesh, facet_centroids, facet_normals
 from landing_cli.reach.certificate import GravityBounds, gravity_bounds, gravity_tube
 from landing_cli.reach.delivery import VALUE_COLUMNS, Deliveries, Frame, deliver_many, new_deliveries
 from landing_cli.reach.free_batch import Batch
@@ -360,3 +361,48 @@ def _saturated(work: Work) -> Ints:
 def solve_facets(case: LandingCase, facets: NDArray[np.integer]) -> FacetSolutions:
     """Solve some facets of a case (it surveys and prepares the case each time)."""
     return solve_prepared(prepare(case, survey(case)), facets)
+
+
+def solve_verdicts(prepared: PreparedCase, facets: NDArray[np.integer]) -> NDArray[np.uint8]:
+    """Find the verdicts of :func:`solve_prepared`, and nothing else, in two thirds of the time.
+
+    The same steps decide; left out is what cannot change a verdict: the finer flights to facets that a
+    flight reaches already, and rock along a path where it is only reported.
+
+    Parameters
+    ----------
+    prepared : PreparedCase
+        From :func:`prepare`.
+    facets : (n,) int
+        Facets, 0-based.
+
+    Returns
+    -------
+    (n,) uint8
+        Values of Verdict, in the order given.
+    """
+    indices = np.asarray(facets, dtype=np.int64)
+    if prepared.case.terrain == "require":  # then rock decides, and each better flight may meet some
+        return np.asarray(solve_prepared(prepared, indices).rows["verdict"])
+    blind = _without_terrain(prepared)
+    rows = _on_coarse_grid(blind, indices).rows
+    verdicts = rows["verdict"].copy()
+    again = _doubtful(rows)
+    if len(again):
+        finer = _on_fine_grid(blind, indices[again]).rows["verdict"]
+        resolved = finer != Verdict.UNRESOLVED
+        verdicts[again[resolved]] = finer[resolved]
+    return np.asarray(verdicts)
+
+
+def _without_terrain(prepared: PreparedCase) -> PreparedCase:
+    """The same case over a surface so far away that no path needs a second look at it."""
+    shared = replace(prepared.shared, surface=_far_surface())
+    return replace(prepared, shared=shared, frame=prepared.frame._replace(clear_radius_m=math.inf))
+
+
+@cache
+def _far_surface() -> SurfaceIndex:
+    corners = 1e9 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    return build_surface_index(Mesh(corners + 1e12, faces))

@@ -126,6 +126,38 @@ def solutions_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> FacetSolutions:
     return FacetSolutions(rows, nodes)
 
 
+def case_to_attributes(case: LandingCase) -> dict[str, Any]:
+    """Return what a case asks, as attributes of its group; body and spacecraft are stored apart."""
+    return {name: getattr(case, name) for name in (*_CASE_NUMBERS, *_CASE_VECTORS, *_CASE_CHOICES)}
+
+
+def case_from_attributes(name: str, group: Group, asteroid: Asteroid, craft: Spacecraft) -> LandingCase:
+    """Rebuild a case from the attributes of its group.
+
+    Parameters
+    ----------
+    name : str
+        Of the case.
+    group : Group
+        With the attributes of ``case_to_attributes``.
+    asteroid, craft : Asteroid, Spacecraft
+        As they were stored.
+
+    Returns
+    -------
+    LandingCase
+
+    Raises
+    ------
+    KeyError, ValueError
+        If an attribute is missing, or of another type.
+    """
+    facts: dict[str, Any] = {key: number(group, key) for key in _CASE_NUMBERS}
+    facts |= {key: vector(group, key) for key in _CASE_VECTORS}
+    facts |= {key: str(group.attributes[key]) for key in _CASE_CHOICES}
+    return LandingCase(name, asteroid, craft, **facts)
+
+
 def run_to_tree(run: ReachRun) -> Group:
     """Lay a run out for the store.
 
@@ -193,10 +225,9 @@ def _run_from_tree(tree: Group) -> ReachRun:
 
 
 def _case_to_group(result: CaseResult, order: int) -> Group:
-    case, solutions = result.case, result.solutions
-    names = (*_CASE_NUMBERS, *_CASE_VECTORS, *_CASE_CHOICES)
+    solutions = result.solutions
     attributes: dict[str, Any] = {"order": order, "initial_state": result.initial_state}
-    attributes |= {name: getattr(case, name) for name in names}
+    attributes |= case_to_attributes(result.case)
     members: dict[str, Dataset | Group] = {
         "facets": table_group(solutions.rows, FACET_COLUMNS, "facet"),
         "trajectories": _trajectories_to_group(solutions),
@@ -228,9 +259,6 @@ def _trajectories_to_group(solutions: FacetSolutions) -> Group:
 
 
 def _case_from_group(name: str, group: Group, asteroid: Asteroid, craft: Spacecraft) -> CaseResult:
-    facts: dict[str, Any] = {key: number(group, key) for key in _CASE_NUMBERS}
-    facts |= {key: vector(group, key) for key in _CASE_VECTORS}
-    facts |= {key: str(group.attributes[key]) for key in _CASE_CHOICES}
     rows = table_rows(group.group("facets"), FACET_COLUMNS)
     nodes = group.group("trajectories").dataset("thrust_nodes_n").data
     solutions = solutions_from_arrays({"rows": rows, "thrust_nodes_n": nodes})
@@ -240,7 +268,7 @@ def _case_from_group(name: str, group: Group, asteroid: Asteroid, craft: Spacecr
         facets, reasons = table.dataset("facet").data.tolist(), table.dataset("reason").data.tolist()
         lost = dict(zip(facets, reasons, strict=True))
     return CaseResult(
-        LandingCase(name, asteroid, craft, **facts),
+        case_from_attributes(name, group, asteroid, craft),
         str(group.attributes["initial_state"]),
         solutions,
         group_to_mapping(group.group("summary")),

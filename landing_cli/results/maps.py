@@ -61,7 +61,7 @@ def to_ply(mesh: Mesh, table: Table) -> bytes:
     mesh : Mesh
         The body.
     table : Table
-        One row a facet (``on_every_facet``); a column ``verdict`` gives the colours.
+        One row a facet (``on_every_facet``); a column ``verdict`` or ``probability`` gives the colours.
 
     Returns
     -------
@@ -135,7 +135,8 @@ def to_obj(mesh: Mesh, table: Table) -> bytes:
     mesh : Mesh
         The body.
     table : Table
-        One row a facet (``on_every_facet``); without a column ``verdict`` there are no groups.
+        One row a facet (``on_every_facet``); without a column ``verdict`` or ``probability`` there are no
+        groups.
 
     Returns
     -------
@@ -145,11 +146,10 @@ def to_obj(mesh: Mesh, table: Table) -> bytes:
     lines = ["# lengths in metres, body frame; facets in the shape file's order"]
     lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
     faces = [f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist()]
-    verdict = table.columns.get("verdict")
-    if verdict is None:
+    words = _kinds(table)
+    if words is None:
         return "\n".join([*lines, *faces, ""]).encode()
-    words = verdict.cells()
-    starts = [0, *(np.flatnonzero(np.diff(verdict.values)) + 1).tolist(), len(faces)]
+    starts = [0, *(i for i in range(1, len(faces)) if words[i] != words[i - 1]), len(faces)]
     for begin, end in pairwise(starts):
         lines += [f"g {words[begin]}", *faces[begin:end]]
     return "\n".join([*lines, ""]).encode()
@@ -158,8 +158,24 @@ def to_obj(mesh: Mesh, table: Table) -> bytes:
 WRITERS: Mapping[str, Callable[[Mesh, Table], bytes]] = {"ply": to_ply, "vtp": to_vtp, "obj": to_obj}
 
 
+def _kinds(table: Table) -> list[str] | None:
+    """What a facet's group is called: its verdict, or the tenth that its probability lies in."""
+    verdict, probability = table.columns.get("verdict"), table.columns.get("probability")
+    if verdict is not None:
+        return verdict.cells()
+    if probability is None:
+        return None
+    tenths = np.minimum((10.0 * probability.values).astype(int), 9)
+    return [f"probability_{k / 10:.1f}_to_{(k + 1) / 10:.1f}" for k in tenths.tolist()]
+
+
 def _colours(table: Table) -> NDArray[np.uint8]:
     grey = COLOURS["unresolved"]
+    probability = table.columns.get("probability")
+    if probability is not None:
+        ends = np.array([COLOURS["unreachable"], COLOURS["reachable"]], dtype=np.float64)
+        share = np.clip(probability.values, 0.0, 1.0)[:, None]
+        return np.asarray(((1.0 - share) * ends[0] + share * ends[1]).round().astype(np.uint8))
     verdict = table.columns.get("verdict")
     words = verdict.cells() if verdict else ["unresolved"] * len(table)
     return np.array([COLOURS.get(word, grey) for word in words], dtype=np.uint8)

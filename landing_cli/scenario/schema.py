@@ -21,6 +21,7 @@ from landing_cli.scenario.schema_base import (
     wrong,
 )
 from landing_cli.scenario.schema_body import Body
+from landing_cli.scenario.schema_disperse import DisperseSection
 from landing_cli.scenario.schema_isochrone import IsochroneSection
 from landing_cli.scenario.schema_observe import ObserveSection
 from landing_cli.scenario.schema_plan import PlanSection
@@ -222,6 +223,9 @@ class Scenario(Section):
     )
     isochrone: IsochroneSection | None = Field(
         None, description="the times of flight at which each facet is reachable: `reach isochrone`"
+    )
+    disperse: DisperseSection | None = Field(
+        None, description="what is not known exactly, and how well it is known: `reach disperse`"
     )
 
     def model_post_init(self, context: Any, /) -> None:

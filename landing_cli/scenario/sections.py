@@ -6,6 +6,7 @@ from landing_cli.errors import InputRefused
 from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.messages import Problem, refusal
 from landing_cli.scenario.schema import Reach, Scenario
+from landing_cli.scenario.schema_disperse import DisperseSection
 from landing_cli.scenario.schema_isochrone import IsochroneSection
 from landing_cli.scenario.schema_observe import ObserveSection
 from landing_cli.scenario.schema_plan import PlanSection
@@ -15,6 +16,7 @@ MISSIONS = (
     "plan",
     "observe",
     "isochrone",
+    "disperse",
 )
 
 
@@ -90,6 +92,31 @@ def isochrone_section(loaded: LoadedScenario) -> IsochroneSection:
     return loaded.scenario.isochrone or IsochroneSection()
 
 
+def disperse_section(loaded: LoadedScenario) -> DisperseSection:
+    """Return what a scenario says for ``reach disperse``.
+
+    Parameters
+    ----------
+    loaded : LoadedScenario
+        The checked scenario.
+
+    Returns
+    -------
+    DisperseSection
+
+    Raises
+    ------
+    InputRefused
+        It has no such section, or that one disperses nothing.
+    """
+    fix = "`reach disperse` needs position_sigma_m, velocity_sigma_m_s, thrust_sigma_relative, ... there"
+    if loaded.scenario.disperse is None:
+        raise _missing(loaded, "disperse", fix)
+    if not loaded.scenario.disperse.disperses:
+        raise refusal([Problem(("disperse",), "disperses nothing", fix)], loaded.places, loaded.source)
+    return loaded.scenario.disperse
+
+
 def for_mission(scenario: Scenario, *missions: str) -> Scenario:
     """Drop the sections of other missions: what they say changes no number of this one.
 
@@ -97,7 +124,7 @@ def for_mission(scenario: Scenario, *missions: str) -> Scenario:
     ----------
     scenario : Scenario
         All of it.
-    *missions : {"reach", "plan", "observe", "isochrone"}
+    *missions : {"reach", "plan", "observe", "isochrone", "disperse"}
         Whose sections stay.
 
     Returns

@@ -44,6 +44,11 @@ ZERO = (
     "weight",
     "revolutions_max",
     "first_burn_wait_d",
+    "position_sigma_m",
+    "velocity_sigma_m_s",
+    "mass_sigma_relative",
+    "thrust_sigma_relative",
+    "gm_sigma_relative",
 )
 # lists that stay valid with an element less
 SHORTER = ("tof_s", "waypoints", "weight", "exclude")
@@ -90,6 +95,13 @@ OPTIONAL = (
     "tof_max_s",
     "step_s",
     "tolerance_s",
+    # of a dispersion
+    "axes",
+    "position_sigma_m",
+    "velocity_sigma_m_s",
+    "mass_sigma_relative",
+    "thrust_sigma_relative",
+    "gm_sigma_relative",
     # of a tour
     "catalogue",
     "perihelion_max_au",

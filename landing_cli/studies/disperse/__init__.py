@@ -1,0 +1,1 @@
+"""How surely each facet is reachable, when the start is not known exactly."""
