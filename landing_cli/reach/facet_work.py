@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.reach.free_descent import PreparedCase, solve_prepared
+from landing_cli.reach.free_stage import solve_free_stage
+from landing_cli.reach.least_thrust import with_margin
 from landing_cli.reach.records import FacetSolutions, join
 
 Items = NDArray[np.int64]
@@ -52,12 +54,16 @@ def solve_items(prepared: tuple[PreparedCase, ...], facets: int, items: Items) -
 
 
 def _solve(prepared: PreparedCase, facets: Items) -> FacetSolutions:
-    free = solve_prepared(prepared, facets)
-    if prepared.case.descent == "free":
-        return free
-    from landing_cli.reach.extremal_descent import solve_from
+    case = prepared.case
+    if case.free_final_stage is not None:
+        return solve_free_stage(prepared, case.free_final_stage, facets)
+    solutions = solve_prepared(prepared, facets)
+    if case.descent == "extremal":
+        from landing_cli.reach.extremal_descent import solve_from
 
-    return solve_from(prepared, free)
+        solutions = solve_from(prepared, solutions)
+    solutions.rows["final_stage_s"] = case.final_stage_s
+    return with_margin(prepared, solutions) if case.margin else solutions
 
 
 def of_case(solutions: FacetSolutions, case: int, facets: int) -> FacetSolutions:

@@ -11,6 +11,7 @@ from pydantic import Discriminator, Field, Tag, TypeAdapter, ValidationError
 from landing_cli.scenario.messages import KeyPath, Problem, refusal
 from landing_cli.scenario.schema_base import (
     Auto,
+    FinalStage,
     Number3,
     Positive3,
     Seconds,
@@ -27,6 +28,10 @@ from landing_cli.scenario.schema_tour import TourScenario
 from landing_cli.scenario.translate import problems_of
 
 S = TypeVar("S", bound=Section)
+
+
+# Of the time of flight, where the final stage's duration is free.
+FREE_STAGE_SHARES = (0.05, 0.75)
 
 
 class SpacecraftSection(Section):
@@ -105,8 +110,12 @@ class Reach(Section):
         min_length=1, max_length=1000, description="list of states from which the descent begins"
     )
     tof_s: Times | None = Field(None, description="time of flight, s: a number, or a list of them")
-    final_stage_s: Seconds = Field(
-        description="part of the time of flight that the final landing stage takes, s"
+    final_stage_s: FinalStage = Field(
+        description="part of the time of flight that the final landing stage takes, s: a number; "
+        "or chosen for each facet: [shortest, longest] | free (5 to 75 % of the time of flight)"
+    )
+    final_stage_compared_s: Seconds | None = Field(
+        None, description="with a free final stage: the duration whose domain it is compared with, s"
     )
     ellipsoid_m: Auto | Annotated[Positive3, Tag("value")] = Field(
         "auto",
@@ -133,6 +142,9 @@ class Reach(Section):
     terrain: Literal["report", "require"] = Field(
         "report", description="whether a path that cuts the mesh is a landing: report | require (it is not)"
     )
+    margin: bool = Field(
+        False, description="whether every facet is asked for its least thrust level, and its boundary traced"
+    )
     method: Literal["traverse", "section"] = Field(
         "traverse", description="how the domain is found: traverse (every facet) | section (the paper's)"
     )
@@ -144,6 +156,7 @@ class Reach(Section):
     def model_post_init(self, context: Any, /) -> None:
         """Refuse states without a name of their own or without a time, and times that contradict."""
         self._check_names()
+        self._check_final_stage()
         if self.tof_s is not None:
             self._check_times(self.tof_s, "tof_s")
         for index, state in enumerate(self.initial_states):
@@ -153,6 +166,15 @@ class Reach(Section):
                 raise wrong(
                     "tof_s", "is missing", f"give reach.tof_s, or tof_s in initial state {state.name}"
                 )
+
+    def final_stages_s(self, tof_s: float) -> tuple[float, float]:
+        """Return the shortest and the longest duration of the final stage in a flight, s."""
+        if isinstance(self.final_stage_s, tuple):
+            return self.final_stage_s
+        if isinstance(self.final_stage_s, float):
+            return self.final_stage_s, self.final_stage_s
+        shortest, longest = FREE_STAGE_SHARES
+        return shortest * tof_s, longest * tof_s
 
     def times_of(self, state: InitialState) -> tuple[float, ...]:
         """Return the times of flight that are flown from one initial state, s."""
@@ -179,14 +201,35 @@ class Reach(Section):
                 )
             first[state.name] = index
 
+    def _check_final_stage(self) -> None:
+        free, compared = not isinstance(self.final_stage_s, float), self.final_stage_compared_s
+        if isinstance(self.final_stage_s, tuple) and self.final_stage_s[0] >= self.final_stage_s[1]:
+            shortest, longest = self.final_stage_s
+            raise wrong(
+                "final_stage_s", f"[{shortest:g}, {longest:g}] does not ascend", "[shortest, longest]"
+            )
+        if free and self.descent == "extremal":
+            raise wrong(
+                "final_stage_s", "is free, but descent is extremal", "give a number, or descent: free"
+            )
+        if compared is not None and not free:
+            raise wrong(
+                "final_stage_compared_s",
+                "is given, but final_stage_s is a number",
+                "leave it out, or make final_stage_s free",
+            )
+
     def _check_times(self, times: tuple[float, ...], key: str) -> None:
         for index, tof_s in enumerate(times):
-            if tof_s <= self.final_stage_s:
-                raise wrong(
-                    "final_stage_s",
-                    f"{self.final_stage_s:g} is not shorter than the time of flight of {tof_s:g} s",
-                    f"the final stage is part of the flight: shorten it, or lengthen {key}",
-                )
+            longest = {"final_stage_s": self.final_stages_s(tof_s)[1]}
+            longest["final_stage_compared_s"] = self.final_stage_compared_s or 0.0
+            for name, duration_s in longest.items():
+                if tof_s <= duration_s:
+                    raise wrong(
+                        name,
+                        f"{duration_s:g} is not shorter than the time of flight of {tof_s:g} s",
+                        f"the final stage is part of the flight: shorten it, or lengthen {key}",
+                    )
             if any(f"{tof_s:.12g}" == f"{earlier:.12g}" for earlier in times[:index]):
                 raise wrong(f"{key}.{index}", f"{tof_s:g} is in the list twice", "remove one")
 
