@@ -2,26 +2,31 @@
 
 The least energy J, and the least thrust level tau where no duration led to a landing, are looked for on a
 lattice of durations: first on every sixteenth of them, then around the two best local least values, in steps
-half as long each time. A duration is a value of the lattice whatever else is asked, so a facet's answer
-depends on the facet alone. Between lattice points nothing is asked and nothing is proved: with a free final
-stage no facet is called proved unreachable.
+half as long each time. That is done on the coarse time grid; the duration that is chosen is then solved as
+any facet is. A duration is a value of the lattice whatever else is asked, so a facet's answer depends on the
+facet alone. Between lattice points nothing is asked and nothing is proved: with a free final stage no facet
+is called proved unreachable.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.reach.free_descent import PreparedCase, prepare, solve_prepared
+from landing_cli.reach.free_descent import PreparedCase, prepare, screen, solve_prepared
+from landing_cli.reach.free_solve import CONVERGED
 from landing_cli.reach.least_thrust import fill_margin, fly_least_thrust
-from landing_cli.reach.margin import ThrustLevels, thrust_levels
+from landing_cli.reach.margin import ThrustLevels, least_thrust_flights, thrust_levels
 from landing_cli.reach.records import FacetSolutions, FreeFinalStage, Verdict, blank_rows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 Ask = Callable[[int, Ints], Floats]
+Solve = Callable[[PreparedCase, Ints], FacetSolutions]
 
 # Intervals of the lattice of durations, and of them to a first step.
 LATTICE, FIRST_STEP = 128, 16
@@ -69,22 +74,37 @@ class _Search:
 
     def run(self) -> FacetSolutions:
         """Search, then put the answers together."""
-        everything = np.arange(len(self.facets))
+        everything, compared_s = np.arange(len(self.facets)), self.free.compared_s
         compared = np.full(len(self.facets), Verdict.UNRESOLVED, dtype=np.uint8)
-        if self.free.compared_s is not None:
-            compared[:] = self._try(self.free.compared_s, everything).rows["verdict"]
-        energy = ask_first_steps(self._energy, len(self.facets))
+        if compared_s is not None:
+            compared[:] = self._keep(solve_prepared, compared_s, everything)["verdict"]
+        self._search_energy(everything, ask_first_steps(self._energy, len(self.facets)))
         margin = self.prepared.case.margin
-        asked = everything if margin else np.flatnonzero(self.rows["verdict"] != Verdict.REACHABLE)
-        level = ask_first_steps(lambda step, places: self._level(step, asked[places]), len(asked))
-        near = everything[: len(asked)] if margin else np.flatnonzero(_least(level) < HOPELESS_LEVEL)
-        level[near] = refine(lambda step, places: self._level(step, asked[near[places]]), level[near])
-        self._try_least_thrust(asked, level, energy)
-        found = np.flatnonzero(np.isfinite(_least(energy)))
-        refine(lambda step, places: self._energy(step, found[places]), energy[found])
-        self._fill_levels(asked, level)
+        self._search_level(everything if margin else np.flatnonzero(~self._reached(everything)))
         self.rows["compared_verdict"], self.rows["iterations"] = compared, self.iterations
         return FacetSolutions(self.rows, np.concatenate([np.zeros((0, 3)), *self.nodes]))
+
+    def _search_energy(self, places: Ints, energy: Floats) -> None:
+        """Go on from some energies to the least of facets where there is any, and solve these anew."""
+        found = np.isfinite(_least(energy))
+        chosen = places[found]
+        energy = refine(lambda step, among: self._energy(step, chosen[among]), energy[found])
+        for step, among in _by_step(energy):
+            self._keep(solve_prepared, float(self.durations_s[step]), chosen[among])
+
+    def _search_level(self, places: Ints) -> None:
+        """Find the least level of some facets, land where it allows it, and keep what stops the others."""
+        level = ask_first_steps(lambda step, among: self._level(step, places[among]), len(places))
+        near = self.prepared.case.margin | (_least(level) < HOPELESS_LEVEL)
+        level[near] = refine(lambda step, among: self._level(step, places[near][among]), level[near])
+        lost, energy = ~self._reached(places), np.full(level.shape, np.nan)
+        for step, among in _by_step(level):
+            self._at_least_level(float(self.durations_s[step]), places[among])
+            energy[among, step] = self.rows[_COST][places[among]]  # NaN where none was landed on
+        self._search_energy(places[lost], energy[lost])
+
+    def _reached(self, places: Ints) -> Flags:
+        return np.asarray(self.rows["verdict"][places] == Verdict.REACHABLE)
 
     def _at(self, duration_s: float) -> PreparedCase:
         """The case with one duration, all of them with the same gravity in memory."""
@@ -93,14 +113,12 @@ class _Search:
             own = prepare(base.case.with_final_stage(duration_s), base.shared)
             gravity = base.coarse.gravity_params
             grids = own.coarse._replace(gravity_params=gravity), own.fine._replace(gravity_params=gravity)
-            self.known[duration_s] = PreparedCase(
-                own.case, own.shared, *grids, own.coarse_tube, own.fine_tube, own.frame
-            )
+            self.known[duration_s] = replace(own, coarse=grids[0], fine=grids[1])
         return self.known[duration_s]
 
-    def _try(self, duration_s: float, places: Ints) -> FacetSolutions:
+    def _keep(self, solve: Solve, duration_s: float, places: Ints) -> NDArray[np.void]:
         """Solve some facets with one duration; a flight that costs less takes the place of the best."""
-        found = solve_prepared(self._at(duration_s), self.facets[places])
+        found = solve(self._at(duration_s), self.facets[places])
         found.rows["final_stage_s"] = duration_s
         self.iterations[places] += found.rows["iterations"]
         reachable = found.rows["verdict"] == Verdict.REACHABLE
@@ -108,52 +126,43 @@ class _Search:
         for row in np.flatnonzero(better).tolist():
             self.rows[places[row]] = found.rows[row]
             self.nodes[places[row]] = found.nodes_of(row)
-        return found
+        return found.rows
 
     def _energy(self, step: int, places: Ints) -> Floats:
-        found = self._try(float(self.durations_s[step]), places).rows
+        found = self._keep(screen, float(self.durations_s[step]), places)
         return np.where(found["verdict"] == Verdict.REACHABLE, found[_COST], np.inf)
 
     def _level(self, step: int, places: Ints) -> Floats:
-        levels = thrust_levels(self._at(float(self.durations_s[step])), self.facets[places])
-        return np.where(levels.solved, levels.level, np.inf)
+        own, shared = self._at(float(self.durations_s[step])), self.prepared.shared
+        targets, normals = shared.centroids_m[self.facets[places]], shared.normals[self.facets[places]]
+        flights = least_thrust_flights(own, own.coarse, own.coarse_tube, targets, normals)
+        self.iterations[places] += flights.iterations
+        return np.where(flights.status == CONVERGED, flights.level, np.inf)
 
-    def _try_least_thrust(self, asked: Ints, level: Floats, energy: Floats) -> None:
-        """Solve, where nothing was found yet, with the duration of the least level; keep what stops it."""
-        best = _best_steps(level)
-        lost = self.rows["verdict"][asked] != Verdict.REACHABLE
-        for step in np.unique(best[lost]).tolist():
-            chosen = np.flatnonzero(lost & (best == step))
-            places = asked[chosen]
-            found = self._try(float(self.durations_s[step]), places).rows
-            reached = found["verdict"] == Verdict.REACHABLE
-            energy[places, step] = np.where(reached, found[_COST], np.inf)
-            least, stopped = level[chosen, step], np.flatnonzero(~reached)
-            self.rows[places[stopped]] = found[stopped]
-            short = np.flatnonzero(~reached & (least > 1.0) & np.isfinite(least))
-            self.rows["verdict"][places[short]] = Verdict.UNREACHABLE
-            self.rows["violation"][places[short]] = least[short] - 1.0
-            unknown = np.flatnonzero(~reached & ~np.isfinite(least))
-            self.rows["verdict"][places[unknown]] = Verdict.UNRESOLVED
-        self.rows["proved"] = 0
-
-    def _fill_levels(self, asked: Ints, level: Floats) -> None:
-        """Fill the margin of those that were asked; on demand with the level of the flight that has it."""
-        best, least = _best_steps(level), _least(level)
-        least = np.where(np.isfinite(least), least, np.nan)
-        rows = self.rows[asked]
-        if not self.prepared.case.margin:
-            reachable = rows["verdict"] == Verdict.REACHABLE
-            self.rows["thrust_margin"][asked] = 1.0 - np.where(reachable, np.minimum(least, 1.0), least)
-            return
-        flown = np.full(len(asked), np.nan)
-        for step in np.unique(best).tolist():
-            chosen = np.flatnonzero(best == step)
-            own = self._at(float(self.durations_s[step]))
-            flown[chosen] = fly_least_thrust(own, self.facets[asked[chosen]])[1].rows["thrust_level_flown"]
-        unproved = np.full(len(asked), np.nan)
-        fill_margin(rows, ThrustLevels(least, unproved, np.isfinite(least)), flown)
-        self.rows[asked] = rows
+    def _at_least_level(self, duration_s: float, places: Ints) -> None:
+        """Fill the level of some facets; where none was landed on yet, land, or tell what stops that."""
+        own, margin = self._at(duration_s), self.prepared.case.margin
+        if margin:
+            levels, flights = fly_least_thrust(own, self.facets[places])
+            flown = flights.rows["thrust_level_flown"]
+        else:
+            levels, flown = thrust_levels(own, self.facets[places]), np.full(len(places), np.nan)
+        lost = np.flatnonzero(~self._reached(places))
+        found = self._keep(solve_prepared, duration_s, places[lost])
+        stopped = np.flatnonzero(~self._reached(places[lost]))
+        short = levels.level[lost[stopped]] > 1.0
+        self.rows[places[lost[stopped]]] = found[stopped]
+        rows = self.rows[places]
+        judged = lost[stopped]
+        rows["proved"] = 0
+        rows["verdict"][judged[short]] = Verdict.UNREACHABLE
+        rows["violation"][judged[short]] = levels.level[judged[short]] - 1.0
+        rows["verdict"][judged[~short & ~levels.solved[judged]]] = Verdict.UNRESOLVED
+        unproved = ThrustLevels(levels.level, np.full(len(places), np.nan), levels.solved)
+        fill_margin(rows, unproved, flown)
+        if not margin:
+            rows["thrust_level_flown"] = np.nan
+        self.rows[places] = rows
 
 
 def ask_first_steps(ask: Ask, size: int) -> Floats:
@@ -224,9 +233,11 @@ def _valleys(known: Floats) -> tuple[Ints, Ints]:
     return rows, best[rows, columns]
 
 
-def _best_steps(known: Floats) -> Ints:
-    """Step of the least known value of every row; the first where there is none."""
-    return np.asarray(np.where(np.isnan(known), np.inf, known).argmin(axis=1))
+def _by_step(known: Floats) -> Iterator[tuple[int, Ints]]:
+    """Steps that have the least known value of some rows, and these; the first step where there is none."""
+    best = np.where(np.isnan(known), np.inf, known).argmin(axis=1)
+    for step in np.unique(best).tolist():
+        yield step, np.flatnonzero(best == step)
 
 
 def _least(known: Floats) -> Floats:

@@ -26,7 +26,7 @@ Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 # Thrust levels that a bound above 1 is tried against.
-TRIED_LEVELS = np.concatenate([1.0 + np.linspace(0.0, 0.2, 81), np.geomspace(1.205, 20.0, 120)])
+TRIED_LEVELS = np.concatenate([1.0 + 0.005 * np.arange(40), np.geomspace(1.2, 20.0, 100)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,9 +196,12 @@ def bound_beyond_full(scaled: ScaledCase, bounds: GravityBounds, bound: Floats) 
     (n,) float
         Certified lower bounds on tau: the certificates themselves up to 1.
     """
+    highest = bound.max(initial=0.0)
+    if highest <= 1.0:
+        return bound
     flow, free = scaled.mass_flow, scaled._replace(propellant=2.0)
     used = flow * (1.0 + scaled.final_time)
-    tried = TRIED_LEVELS[TRIED_LEVELS * used < 1.0]
+    tried = TRIED_LEVELS[(TRIED_LEVELS * used < 1.0) & (highest >= TRIED_LEVELS)]
     narrow = gravity_tube(free, bounds)
     # with this mass flow the tube's strongest thrust per mass is T / (1 - T flow)
     wide = [gravity_tube(free._replace(mass_flow=1.0 - (1.0 - T * flow) / T), bounds) for T in tried]
