@@ -66,7 +66,7 @@ def margins(say: Callable[[str], None] = lambda _: None) -> str:
     s = freed.summary
     durations, gained = s["final_stage_s"], s["gained_by_free_stage"]
     before = int((freed.solutions.rows["compared_verdict"] == Verdict.REACHABLE).sum())
-    dearer, saved = _saving(freed)
+    lost, saved = _saving(freed)
     return f"""## 11. How much thrust is to spare
 
 `reach.margin: true` asks every facet for tau, the least share of the thrust bound at which it is reached. What
@@ -84,8 +84,8 @@ facets, which can only follow their own edges:
 
 **A free final stage** (`final_stage_s: free`). {freed.case.name}: with {FIXED_S} s for every facet {before} facets are
 reachable; with a duration of its own ({durations["min"]:.0f} to {durations["max"]:.0f} s, median {durations["median"]:.0f} s) for each
-{s["reachable"]}: {gained["facets"]} more, {gained["area_m2"]:.0f} m² ({percent(gained["area_m2"], s["reachable_area_m2"] - gained["area_m2"])} more area). No facet that
-{FIXED_S} s reach is lost ({dearer} are), and J falls by {saved} % (least / median / largest) on these.
+{s["reachable"]}: {gained["facets"]} more, {gained["area_m2"]:.0f} m² ({percent(gained["area_m2"], s["reachable_area_m2"] - gained["area_m2"])} more area). Of the facets
+that {FIXED_S} s reach {lost} are lost, and J falls by {saved} % (least / median / largest) on these.
 """
 
 

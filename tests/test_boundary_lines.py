@@ -45,7 +45,7 @@ def round_case(subdivisions: int) -> PreparedCase:
 def colatitude_of_the_boundary(prepared: PreparedCase) -> float:
     """Bisection for tau = 1 along a meridian of the ball itself, deg."""
     low, high = 40.0, 140.0
-    for _ in range(5):
+    for _ in range(4):
         angles = np.linspace(low, high, 11)
         normals = np.stack([np.sin(np.radians(angles)), 0 * angles, np.cos(np.radians(angles))], axis=1)
         within = thrust_levels_at(prepared, RADIUS_M * normals, normals).level <= 1.0
@@ -64,9 +64,9 @@ def answered(subdivisions: int) -> tuple[PreparedCase, FacetSolutions]:
 
 
 def test_the_boundary_over_a_ball_is_a_circle_and_converges() -> None:
-    """Facets lie below the ball: the circle's error falls with their size squared, 1280 to 5120 facets."""
+    """Facets lie below the ball: the circle's error falls with their size squared, 320 to 1280 facets."""
     truth, worst = colatitude_of_the_boundary(round_case(3)), []
-    for subdivisions in (3, 4):
+    for subdivisions in (2, 3):
         prepared, found = answered(subdivisions)
         lines = margin_lines(prepared.case.asteroid.mesh, found.rows)
         assert len(lines.offsets) == 2
@@ -74,9 +74,9 @@ def test_the_boundary_over_a_ball_is_a_circle_and_converges() -> None:
         colatitude = np.degrees(np.arccos(p[:, 2] / np.linalg.norm(p, axis=1)))
         worst.append(np.abs(colatitude - truth).max())
         assert lines.area_within_m2 == pytest.approx(
-            2.0 * np.pi * RADIUS_M**2 * (1.0 - np.cos(np.radians(truth))), rel=2e-2
+            2.0 * np.pi * RADIUS_M**2 * (1.0 - np.cos(np.radians(truth))), rel=5e-2
         )
-    assert worst[0] < 0.6
+    assert worst[0] < 2.0
     assert worst[1] < 0.4 * worst[0]
 
 
@@ -130,8 +130,10 @@ def test_the_flown_level_and_the_bound_enclose_the_margin() -> None:
     rows, level = found.rows, 1.0 - found.rows["thrust_margin"]
     assert np.isfinite(level).all()
     assert (rows["thrust_level_bound"] <= level).all()
-    assert rows["thrust_level_flown"] == pytest.approx(level, abs=1e-4)
-    reachable = rows["verdict"] == Verdict.REACHABLE
+    reachable, flown = rows["verdict"] == Verdict.REACHABLE, np.isfinite(rows["thrust_level_flown"])
+    assert flown[reachable].all()
+    assert flown.mean() > 0.99
+    assert rows["thrust_level_flown"][flown] == pytest.approx(level[flown], abs=1e-4)
     assert ((level <= 1.0) == reachable).all()
 
 
@@ -241,3 +243,15 @@ def test_centroids_and_lines_agree_on_the_domain() -> None:
     reachable = facet_centroids(mesh)[found.rows["verdict"] == Verdict.REACHABLE]
     nearest = np.linalg.norm(lines.points_m[:, None] - reachable, axis=2).min(axis=1)
     assert nearest.max() < 2.0 * prepared.shared.mean_edge_m
+
+
+def test_with_extremals_the_margin_is_that_of_free_control() -> None:
+    """It rules out what it forbids, and proves more; what it allows an extremal may still not reach."""
+    case = landing_case(asteroid(), margin=True, descent="extremal")
+    prepared, chosen = prepare(case, survey(case)), np.arange(0, 320, 16)
+    rows = solve_items((prepared,), 320, chosen).rows
+    reachable, proved = rows["verdict"] == Verdict.REACHABLE, rows["proved"] == 1
+    assert 3 < reachable.sum() < 17
+    assert (rows["thrust_margin"][reachable] >= 0.0).all()
+    assert proved.sum() > 3
+    assert (proved == (rows["thrust_level_bound"] > 1.0)).all()

@@ -34,6 +34,7 @@ from landing_cli.results.journal import Journal
 from landing_cli.results.output import finish_output, open_output
 from landing_cli.results.provenance import Stopwatch
 from landing_cli.results.store import read
+from landing_cli.results.tree import Group
 from landing_cli.scenario.build import build
 from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.schema import Reach
@@ -193,11 +194,17 @@ def _traverse(solver: Solver, cases: tuple[tuple[str, LandingCase], ...]) -> tup
     for index, (name, case) in enumerate(cases):
         own = of_case(solutions, index, solver.facets)
         missing = lost_of_case(lost, index, solver.facets)
-        mesh, lines = case.asteroid.mesh, None
-        if case.margin and has_margin(own.rows):
-            lines = lines_group(margin_lines(mesh, own.rows))
-        results.append(CaseResult(case, name, own, summarise(mesh, own), lost=missing, level_set=lines))
+        summary = summarise(case.asteroid.mesh, own)
+        results.append(CaseResult(case, name, own, summary, lost=missing, level_set=_lines(case, own)))
     return tuple(results)
+
+
+def _lines(case: LandingCase, solutions: FacetSolutions) -> Group | None:
+    """The boundary tau = 1, where every facet was asked for its margin."""
+    mesh, rows = case.asteroid.mesh, solutions.rows
+    if case.margin and has_margin(rows) and len(rows) == len(mesh.faces):
+        return lines_group(margin_lines(mesh, rows))
+    return None
 
 
 def _section(
@@ -228,4 +235,5 @@ def _section(
         return replace(traversed, summary=summary, boundary=section_group(found))
     solutions = join(asked)
     summary = {**summarise(mesh, solutions), "section": section}
-    return CaseResult(case, name, solutions, summary, section_group(found), lost)
+    lines = _lines(case, solutions)
+    return CaseResult(case, name, solutions, summary, section_group(found), lost, lines)

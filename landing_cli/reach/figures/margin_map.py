@@ -50,7 +50,7 @@ def margin_figure(result: CaseResult, surface: SurfaceMap) -> Figure:
     figure = case_figure(result, surface, _paint(level, scale), contours, None, 0.32)
     for lines in traced:
         _label(figure.axes[-1], lines)
-    add_bar(figure, scale, f"least thrust level, of the bound; contours every {STEP:g}")
+    add_bar(figure, scale, f"least thrust level tau; contours every {STEP:g}")
     return figure
 
 
