@@ -201,7 +201,9 @@ def bound_beyond_full(scaled: ScaledCase, bounds: GravityBounds, bound: Floats) 
         return bound
     flow, free = scaled.mass_flow, scaled._replace(propellant=2.0)
     used = flow * (1.0 + scaled.final_time)
-    tried = TRIED_LEVELS[(TRIED_LEVELS * used < 1.0) & (highest >= TRIED_LEVELS)]
+    # min(T, b(T)) is largest next to T = b(T) < b: no company makes it other than this
+    enough = TRIED_LEVELS[: np.searchsorted(TRIED_LEVELS, highest, side="right") + 1]
+    tried = enough[enough * used < 1.0]
     narrow = gravity_tube(free, bounds)
     # with this mass flow the tube's strongest thrust per mass is T / (1 - T flow)
     wide = [gravity_tube(free._replace(mass_flow=1.0 - (1.0 - T * flow) / T), bounds) for T in tried]
