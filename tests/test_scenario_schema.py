@@ -148,6 +148,16 @@ def test_a_rotation_rate_stands_for_a_period() -> None:
             "reach.final_stage_s=700",
             "reach.final_stage_s: 700 is not shorter than the time of flight of 700 s",
         ),
+        ("reach.final_stage_s=[300, 100]", "final_stage_s: [300, 100] does not ascend; [shortest, longest]"),
+        (
+            "reach.final_stage_s=[100, 700]",
+            "final_stage_s: 700 is not shorter than the time of flight of 700",
+        ),
+        ("reach.final_stage_s=[100]", "reach.final_stage_s.1: is missing"),
+        ("reach.final_stage_s=[100, 0]", "reach.final_stage_s.1: 0 is not more than 0"),
+        ("reach.final_stage_s=fre", "reach.final_stage_s: 'fre' is not allowed; did you mean free?"),
+        ("reach.final_stage_compared_s=100", "is given, but final_stage_s is a number; leave it out"),
+        ("reach.margin=perhaps", "reach.margin: 'perhaps' is not"),
         ("reach.tof_s=[700, 7e2]", "reach.tof_s.1: 700 is in the list twice"),
         ("reach.tof_s=null", "reach.tof_s: is missing; give reach.tof_s, or tof_s in initial state top"),
         ("reach.initial_states=[]", "reach.initial_states: has 0 elements, at least 1 needed"),
@@ -199,7 +209,8 @@ def test_messages_name_file_line_and_key(tmp_path: Path) -> None:
     )
     assert refusal_of_text(tmp_path, "  final_stage_s: 200\n", "") == (
         "/probe.yaml:8: reach.final_stage_s: is missing; "
-        "part of the time of flight that the final landing stage takes, s"
+        "part of the time of flight that the final landing stage takes, s: a number; "
+        "or chosen for each facet: [shortest, longest] | free (5 to 75 % of the time of flight)"
     )
 
 
@@ -224,3 +235,29 @@ def test_records_are_frozen() -> None:
     with pytest.raises(ValueError, match="frozen"):
         scenario.name = "other"
     assert isinstance(scenario, Scenario)
+
+
+def test_a_free_final_stage_takes_a_share_of_each_flight_or_the_range_that_is_given() -> None:
+    tree = parse(MINIMAL, "m").tree
+    tree["reach"]["final_stage_s"] = "free"
+    reach = from_tree(tree).reach
+    assert reach.final_stages_s(700.0) == (35.0, 525.0)
+    tree["reach"]["final_stage_s"] = [100, 250.5]
+    tree["reach"]["final_stage_compared_s"] = 200
+    reach = from_tree(tree).reach
+    assert reach.final_stages_s(700.0) == reach.final_stages_s(900.0) == (100, 250.5)
+    assert from_tree(parse(to_yaml(from_tree(tree)), "again").tree).reach == reach
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"final_stage_s": "free", "descent": "extremal"}, "final_stage_s: is free, but descent is extremal"),
+        ({"final_stage_s": "free", "final_stage_compared_s": 700}, "compared_s: 700 is not shorter than"),
+    ],
+)
+def test_a_free_final_stage_that_contradicts_is_refused(changes: dict[str, object], message: str) -> None:
+    tree = parse(MINIMAL, "m").tree
+    tree["reach"] |= changes
+    with pytest.raises(InputRefused, match=message):
+        from_tree(tree)

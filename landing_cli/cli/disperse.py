@@ -103,9 +103,9 @@ def disperse(
     loaded = load(scenario, [*_replacements(samples, seed, cases), *(overrides or ())])
     voice.say(f"read {loaded.source}")
     path = output or Path("runs") / f"{loaded.scenario.name}-reach-disperse.h5"
-    from landing_cli.scenario.sections import disperse_section, reach_section
+    from landing_cli.scenario.sections import disperse_section, fixed_stage_reach
 
-    reach_section(loaded), disperse_section(loaded)  # before the solver is imported
+    fixed_stage_reach(loaded, "reach disperse"), disperse_section(loaded)  # before the solver is imported
     if dry_run:
         from landing_cli.studies.disperse.request import request_of
 

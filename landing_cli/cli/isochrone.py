@@ -240,10 +240,10 @@ def _replacements(tof_s: str | None) -> list[str]:
 
 def _say_plan(loaded: LoadedScenario, path: Path, as_json: bool) -> None:
     from landing_cli.scenario.build import build
-    from landing_cli.scenario.sections import reach_section
+    from landing_cli.scenario.sections import fixed_stage_reach
     from landing_cli.studies.isochrone.pipeline import grid_of, states_of
 
-    reach = reach_section(loaded)
+    reach = fixed_stage_reach(loaded, "reach isochrone")
     built = build(loaded)
     states = states_of(reach, built)
     grid = grid_of(loaded, states)

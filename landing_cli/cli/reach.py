@@ -46,6 +46,7 @@ _TRACE = (
     "misclassified",
     "missed_components",
 )
+_BOUNDARY = ("lines", "length_m", "area_within_m2")
 _SECTION = ("P_d", "P_r", "P_e", "n", "N", "ratio", "iou", "misclassified")
 
 _VERIFICATION = (
@@ -162,6 +163,30 @@ def print_run(run: ReachRun, path: Path, as_json: bool) -> None:
     ]
     columns = [*_COUNTS, "dv_min_m_s", "dv_median_m_s", "dv_max_m_s", "paths_through_rock"]
     console.print_table(columns, rows, title=f"Reachable domain: {run.asteroid.name}")
+    margins = [case for case in cases if case.get("thrust_margin")]
+    if margins:
+        rows = [
+            [
+                case["case"],
+                *(case["thrust_margin"][key] for key in ("min", "median", "max", "unknown")),
+                *((case.get("boundary") or {}).get(key) for key in _BOUNDARY),
+            ]
+            for case in margins
+        ]
+        columns = ["case", "margin_min", "margin_median", "margin_max", "unknown", *_BOUNDARY]
+        console.print_table(columns, rows, title="Thrust margin 1 - tau, and the boundary tau = 1")
+    stages = [case for case in cases if case.get("final_stage_s")]
+    if stages:
+        rows = [
+            [
+                case["case"],
+                *(case["final_stage_s"][key] for key in ("min", "median", "max")),
+                *((case.get("gained_by_free_stage") or {}).get(key) for key in ("facets", "area_m2")),
+            ]
+            for case in stages
+        ]
+        columns = ["case", "shortest_s", "median_s", "longest_s", "facets_gained", "area_gained_m2"]
+        console.print_table(columns, rows, title="Free final stage, and what it adds to the compared one")
     for method, shown, title in (
         ("section", _SECTION, "Section and expansion"),
         ("trace", _TRACE, "Trace of the boundary"),

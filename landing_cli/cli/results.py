@@ -146,7 +146,10 @@ def export(
     ] = None,
     form: Annotated[
         ExportFormat,
-        typer.Option("--format", help="csv, json; ply, vtp, obj: a map of facets; oem: a trajectory."),
+        typer.Option(
+            "--format",
+            help="csv, json; ply, vtp, obj: a map of facets; vtp, obj: a boundary; oem: a trajectory.",
+        ),
     ] = ExportFormat.CSV,
     output: Output = None,
     jobs: Jobs = None,
@@ -312,9 +315,10 @@ def _refuse_nonsense(
     if facet is not None:
         _refuse_facet(result)
     if form in MAP_FORMATS and table not in (ExportedTable.FACETS, ExportedTable.DOMAIN):
-        raise UsageError(
-            f"{form} is a map of facets, not of a {table}", fix="take csv or json for this table"
-        )
+        lines = table is ExportedTable.BOUNDARY
+        if not lines or form is ExportFormat.PLY:
+            fix = "take csv, json, vtp or obj for it" if lines else "take csv or json for this table"
+            raise UsageError(f"{form} is a map of facets, not of a {table}", fix=fix)
     if form is ExportFormat.OEM and not flown:
         raise UsageError(f"an oem holds a trajectory, not the {table} table", fix="take csv or json for it")
     if flown and facet is None and mission.HAS_FACETS:
@@ -351,6 +355,8 @@ def _exported(
 ) -> bytes:
     """Make what is to be written."""
     run, exports = _run_of(result), _module(result, "exports")
+    if form in MAP_FORMATS and table is ExportedTable.BOUNDARY:
+        return bytes(exports.export_lines(run, form.value, case))
     at = {} if tof_s is None else {"tof_s": tof_s}
     if form in MAP_FORMATS:
         return bytes(exports.export_map(run, form.value, case, **at))

@@ -10,13 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.reach.boundary_lines import lines_from_group, margin_lines
 from landing_cli.reach.flown import rows_with_flight
 from landing_cli.reach.free_descent import PATH_COLUMNS
 from landing_cli.reach.records import Binding, Verdict
 from landing_cli.reach.stored import CaseResult
-from landing_cli.reach.summary import summarise
+from landing_cli.reach.summary import has_margin, summarise
 
 Flags = NDArray[np.bool_]
+
+# Levels are searched to this; a certificate is exact.
+LEVEL_SLACK = 1e-4
+# Lines that are traced again may differ by rounding, m.
+LINES_APART_M = 1e-6
 
 
 @dataclass(frozen=True)
@@ -82,6 +88,15 @@ def _rules(result: CaseResult) -> Iterator[tuple[Flags, str]]:
     yield reachable & (rows["thrust_margin"] < 0.0), "is reachable, but needs more than all thrust"
     yield reachable & ~rows_with_flight(result.solutions), "is reachable, but its control is missing"
     yield ~reachable & (rows["thrust_nodes"] > 0), "is not reachable, but has thrust nodes"
+    level, bound = 1.0 - rows["thrust_margin"], rows["thrust_level_bound"]
+    slack = 1.0 + LEVEL_SLACK
+    yield bound > level * slack, "has a least thrust level below its certified bound"
+    yield bound > rows["thrust_level_flown"] * slack, "has a flight below its certified thrust level"
+    yield reachable & (bound > 1.0), "is reachable, but its certified bound is above full thrust"
+    yield (rows["proved"] != 0) & (bound < 1.0), "is proved unreachable, but its bound is below full thrust"
+    if result.case.margin and result.case.descent == "free":
+        within = unreachable & (rows["binding"] != Binding.TERRAIN) & (level <= 1.0)
+        yield within, "is unreachable, but full thrust is enough"
     for name in PATH_COLUMNS:
         blank = np.isnan(rows[name]).reshape(len(rows), -1)
         yield reachable & blank.any(axis=1), f"is reachable, but its {name} is missing"
@@ -99,6 +114,21 @@ def _faults_of_summary(result: CaseResult) -> Iterator[Fault]:
         told = result.summary.get(name)
         if not _same(told, value):
             yield Fault(f"the summary says {name} {told}, the table {value}")
+    yield from _faults_of_lines(result)
+
+
+def _faults_of_lines(result: CaseResult) -> Iterator[Fault]:
+    """The boundary's lines are those of the table's margins."""
+    rows, mesh = result.solutions.rows, result.case.asteroid.mesh
+    expected = result.case.margin and has_margin(rows) and len(rows) == len(mesh.faces)
+    if expected != (result.level_set is not None):
+        yield Fault("the boundary's lines are missing" if expected else "there are lines of a boundary")
+    elif result.level_set is not None:
+        stored, traced = lines_from_group(result.level_set), margin_lines(mesh, rows)
+        alike = stored.points_m.shape == traced.points_m.shape
+        alike = alike and np.array_equal(stored.offsets, traced.offsets)
+        if not alike or not np.allclose(stored.points_m, traced.points_m, rtol=0.0, atol=LINES_APART_M):
+            yield Fault("the boundary's lines are not those of the margins")
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -9,9 +9,11 @@ import numpy as np
 from landing_cli.errors import InputRefused
 from landing_cli.flight.trajectory import Trajectory
 from landing_cli.parallel import WorkPlan
+from landing_cli.reach.boundary_lines import lines_columns, lines_from_group
 from landing_cli.reach.flown import flown_trajectory
 from landing_cli.reach.records import FACET_COLUMNS
 from landing_cli.reach.stored import CaseResult, ReachRun
+from landing_cli.results.lines import LINE_WRITERS
 from landing_cli.results.maps import WRITERS, on_every_facet
 from landing_cli.results.oem import landing_oem
 from landing_cli.results.tables import (
@@ -62,19 +64,23 @@ def boundary_table(result: CaseResult) -> Table:
     Returns
     -------
     Table
-        Facets of the section, the ring, the expansions, the boundary and the domain, below each other; of a
-        trace the edges of the boundary, loop after loop.
+        The points of the lines where tau is 1, line after line, where the margin was asked; of a trace the
+        edges of the boundary, loop after loop; else facets of the section, the ring, the expansions, the
+        boundary and the domain, below each other.
 
     Raises
     ------
     InputRefused
         If the run's method found none.
     """
+    if result.level_set is not None:
+        columns = lines_columns(lines_from_group(result.level_set))
+        return Table({name: TableColumn(values) for name, values in columns.items()})
     if result.boundary is None:
         raise InputRefused(
             "this run traced no boundary",
             where=result.case.name,
-            fix="run with --set reach.method=trace or section, or with --compare",
+            fix="run with --set reach.margin=true, --set reach.method=trace or section, or with --compare",
         )
     lists = result.boundary.members
     if "loop" in lists:
@@ -228,6 +234,38 @@ def export_map(run: ReachRun, form: str, case: str | None = None) -> bytes:
         raise InputRefused("a map shows one case", where="--case", fix=f"take one of {names}")
     mesh = run.asteroid.mesh
     return WRITERS[form](mesh, on_every_facet(facets_table(cases[0]), len(mesh.faces)))
+
+
+def export_lines(run: ReachRun, form: str, case: str | None = None) -> bytes:
+    """Write the boundary of a case as lines in space.
+
+    Parameters
+    ----------
+    run : ReachRun
+        The run.
+    form : {"vtp", "obj"}
+        How.
+    case : str, optional
+        Which case; needed where there are several.
+
+    Raises
+    ------
+    InputRefused
+        If there is no such format or case, several cases and none chosen, or no lines.
+    """
+    if form not in LINE_WRITERS:
+        fix = f"take {', '.join((*TEXT_FORMATS, *LINE_WRITERS))}"
+        raise InputRefused(f"no format '{form}' for lines", where="--format", fix=fix)
+    cases = chosen_cases(run, case)
+    if len(cases) > 1:
+        raise InputRefused(
+            "a file of lines is of one case", where="--case", fix=f"take one of {names_of(cases)}"
+        )
+    if cases[0].level_set is None:
+        told, fix = "this run traced no lines of a boundary", "run with --set reach.margin=true"
+        raise InputRefused(told, where=cases[0].case.name, fix=fix)
+    lines = lines_from_group(cases[0].level_set)
+    return LINE_WRITERS[form](lines.points_m, lines.offsets)
 
 
 def _rank(name: str, order: list[str]) -> int:

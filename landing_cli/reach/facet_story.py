@@ -75,6 +75,8 @@ def _flight(row: Row) -> str:
         f"{row['delta_v_m_s']:.4g} m/s, {row['fuel_kg']:.4g} kg",
         f"peak thrust {100.0 * row['peak_thrust_ratio']:.4g} %",
     ]
+    if np.isfinite(row["thrust_margin"]):
+        parts.append(f"least level that reaches it {_percent(1.0 - row['thrust_margin'])}")
     depth_m = -row["terrain_clearance_min_m"]
     if depth_m > 0.0:
         parts.append(f"but the path cuts {depth_m:.3g} m into rock")
@@ -91,8 +93,15 @@ def _obstacle(result: CaseResult, row: Row) -> str:
         Binding.ELLIPSOID: " to pass around the ellipsoid",
         Binding.GLIDE_SLOPE: " to stay inside the glide slope",
     }.get(binding, "")
-    least = "" if np.isfinite(row["thrust_margin"]) else "at least "
-    return f"it needs {least}{100.0 * (1.0 + violation):.4g} % of the thrust{around}"
+    if np.isfinite(row["thrust_margin"]):
+        bound = row["thrust_level_bound"]
+        certified = f" (certified: at least {_percent(bound)})" if bound > 1.0 else ""
+        return f"it needs {_percent(1.0 - row['thrust_margin'])} of the thrust{around}{certified}"
+    return f"it needs at least {_percent(1.0 + violation)} of the thrust{around}"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.4g} %"
 
 
 def _attempt(row: Row) -> str:

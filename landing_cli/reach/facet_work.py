@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.reach.free_descent import PreparedCase, solve_prepared
+from landing_cli.reach.free_stage import solve_free_stage
+from landing_cli.reach.least_thrust import with_margin
 from landing_cli.reach.records import FacetSolutions, join
 from landing_cli.reach.sides import with_proofs
 
@@ -53,7 +55,9 @@ def solve_items(prepared: tuple[PreparedCase, ...], facets: int, items: Items) -
 
 
 def _solve(prepared: PreparedCase, facets: Items) -> FacetSolutions:
-    return _by_descent(prepared, with_proofs(prepared, solve_prepared(prepared, facets)))
+    if prepared.case.free_final_stage is not None:
+        return solve_free_stage(prepared, prepared.case.free_final_stage, facets)
+    return _completed(prepared, with_proofs(prepared, solve_prepared(prepared, facets)))
 
 
 def solve_without_proofs(prepared: PreparedCase, facets: Items) -> FacetSolutions:
@@ -71,15 +75,20 @@ def solve_without_proofs(prepared: PreparedCase, facets: Items) -> FacetSolution
     FacetSolutions
         In the order given.
     """
-    return _by_descent(prepared, solve_prepared(prepared, facets))
+    if prepared.case.free_final_stage is not None:
+        return solve_free_stage(prepared, prepared.case.free_final_stage, facets)
+    return _completed(prepared, solve_prepared(prepared, facets))
 
 
-def _by_descent(prepared: PreparedCase, free: FacetSolutions) -> FacetSolutions:
-    if prepared.case.descent == "free":
-        return free
-    from landing_cli.reach.extremal_descent import solve_from
+def _completed(prepared: PreparedCase, solutions: FacetSolutions) -> FacetSolutions:
+    """Go on from free control to what the case asks: its family of flights, its margin."""
+    case = prepared.case
+    if case.descent == "extremal":
+        from landing_cli.reach.extremal_descent import solve_from
 
-    return solve_from(prepared, free)
+        solutions = solve_from(prepared, solutions)
+    solutions.rows["final_stage_s"] = case.final_stage_s
+    return with_margin(prepared, solutions) if case.margin else solutions
 
 
 def of_case(solutions: FacetSolutions, case: int, facets: int) -> FacetSolutions:

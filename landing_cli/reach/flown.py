@@ -77,6 +77,13 @@ def row_of(result: CaseResult, facet: int) -> int:
     return row
 
 
+def case_of_row(case: LandingCase, solutions: FacetSolutions, row: int) -> LandingCase:
+    """Return the case as it was flown to the facet of a row, with its own duration of the final stage."""
+    if case.free_final_stage is None:
+        return case
+    return case.with_final_stage(float(solutions.rows["final_stage_s"][row]))
+
+
 def flown_legs(case: LandingCase, solutions: FacetSolutions, row: int) -> tuple[Leg, Leg]:
     """Return the stored control of a row: descent stage and final landing stage.
 
@@ -94,7 +101,8 @@ def flown_legs(case: LandingCase, solutions: FacetSolutions, row: int) -> tuple[
     descent, final : Leg
         Thrust nodes where there are any, else costates; then the arc from the handover to the centroid.
     """
-    known, gravity = solutions.rows[row], case.asteroid.gravity
+    case, known = case_of_row(case, solutions, row), solutions.rows[row]
+    gravity = case.asteroid.gravity
     descent: Leg
     if known["thrust_nodes"] > 0:
         descent = ThrustNodesLeg(case.descent_s, solutions.nodes_of(row))

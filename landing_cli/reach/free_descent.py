@@ -351,6 +351,27 @@ def solve_prepared(prepared: PreparedCase, facets: NDArray[np.integer]) -> Facet
     return solutions
 
 
+def screen(prepared: PreparedCase, facets: NDArray[np.integer]) -> FacetSolutions:
+    """Look for least-energy flights on the coarse grid alone; what is not found so is left unresolved.
+
+    Parameters
+    ----------
+    prepared : PreparedCase
+        From :func:`prepare`.
+    facets : (n,) int
+        Facets, 0-based.
+
+    Returns
+    -------
+    solutions : FacetSolutions
+        One row a facet, in the order given; its flights keep every limit.
+    """
+    work = _new_work(prepared, prepared.coarse, prepared.coarse_tube, np.asarray(facets, dtype=np.int64))
+    _by_energy(prepared, work, np.arange(len(facets)))
+    _within_propellant(prepared, work)
+    return _solutions(prepared, work)
+
+
 def _saturated(work: Work) -> Ints:
     """Rows of flights at full thrust most of the time."""
     full = np.linalg.norm(work.thrust, axis=2) > FULL_THRUST

@@ -9,6 +9,7 @@ of the flights that it is taken over.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +22,11 @@ from landing_cli.reach.free_solve import CONVERGED
 from landing_cli.reach.scaled_case import ScaledCase
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 # Thrust levels that a bound above 1 is tried against.
-TRIED_LEVELS = np.concatenate([1.0 + np.linspace(0.0, 0.2, 81), np.geomspace(1.205, 20.0, 120)])
+TRIED_LEVELS = np.concatenate([1.0 + 0.005 * np.arange(40), np.geomspace(1.2, 20.0, 100)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +86,40 @@ def thrust_levels_at(prepared: PreparedCase, points_m: Floats, normals: Floats) 
     ThrustLevels
         In the order given.
     """
+    return search_levels(prepared, points_m, normals)[0]
+
+
+class GridFlights(NamedTuple):
+    """Flights of least thrust level on one time grid."""
+
+    scaled: ScaledCase
+    points: Ints  # (k,) which of the points they lead to
+    thrust: Floats  # (k, N, 3) scaled, solver axes
+
+
+def search_levels(
+    prepared: PreparedCase, points_m: Floats, normals: Floats
+) -> tuple[ThrustLevels, tuple[GridFlights, GridFlights]]:
+    """Find the least thrust levels of points, and the flights that have them; see :func:`thrust_levels_at`.
+
+    Parameters
+    ----------
+    prepared : PreparedCase
+        From :func:`landing_cli.reach.free_descent.prepare`.
+    points_m, normals : (n, 3) float
+        Touchdown points, m, and unit outward normals, body frame.
+
+    Returns
+    -------
+    levels : ThrustLevels
+        In the order given.
+    coarse, fine : GridFlights
+        Every point that was solved is in one of them.
+    """
     flights = least_thrust_flights(prepared, prepared.coarse, prepared.coarse_tube, points_m, normals)
     levels = _levels(prepared, prepared.coarse, flights)
+    kept, finest = levels.solved.copy(), np.zeros(0, dtype=np.int64)
+    thrust = np.zeros((0, len(prepared.fine.mid_cos), 3))
     again = np.flatnonzero(~(np.abs(levels.level - 1.0) > DOUBTFUL_LEVEL - 1.0))
     if len(again):
         fine = least_thrust_flights(
@@ -96,7 +130,16 @@ def thrust_levels_at(prepared: PreparedCase, points_m: Floats, normals: Floats) 
         levels.level[again] = np.where(finer.solved, finer.level, levels.level[again])
         levels.bound[again] = np.maximum(finer.bound, levels.bound[again])
         levels.solved[again] |= finer.solved
-    return ThrustLevels(np.maximum(levels.level, levels.bound), levels.bound, levels.solved)
+        finest, thrust = again[finer.solved], fine.thrust[finer.solved]
+        kept[finest] = False
+    coarsest = np.flatnonzero(kept)
+    return (
+        ThrustLevels(np.maximum(levels.level, levels.bound), levels.bound, levels.solved),
+        (
+            GridFlights(prepared.coarse, coarsest, flights.thrust[coarsest]),
+            GridFlights(prepared.fine, finest, thrust),
+        ),
+    )
 
 
 def least_thrust_flights(
@@ -153,9 +196,14 @@ def bound_beyond_full(scaled: ScaledCase, bounds: GravityBounds, bound: Floats) 
     (n,) float
         Certified lower bounds on tau: the certificates themselves up to 1.
     """
+    highest = bound.max(initial=0.0)
+    if highest <= 1.0:
+        return bound
     flow, free = scaled.mass_flow, scaled._replace(propellant=2.0)
     used = flow * (1.0 + scaled.final_time)
-    tried = TRIED_LEVELS[TRIED_LEVELS * used < 1.0]
+    # min(T, b(T)) is largest next to T = b(T) < b: no company makes it other than this
+    enough = TRIED_LEVELS[: np.searchsorted(TRIED_LEVELS, highest, side="right") + 1]
+    tried = enough[enough * used < 1.0]
     narrow = gravity_tube(free, bounds)
     # with this mass flow the tube's strongest thrust per mass is T / (1 - T flow)
     wide = [gravity_tube(free._replace(mass_flow=1.0 - (1.0 - T * flow) / T), bounds) for T in tried]

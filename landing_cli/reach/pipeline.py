@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from landing_cli import __version__
 from landing_cli.parallel import WorkPlan
 from landing_cli.reach import traced_work
 from landing_cli.reach.boundary import find_section, section_comparison, section_group, section_summary
+from landing_cli.reach.boundary_lines import lines_group, margin_lines
 from landing_cli.reach.cases import landing_cases
 from landing_cli.reach.facet_work import (
     CHUNK_FACETS,
@@ -28,7 +29,7 @@ from landing_cli.reach.kernels import are_compiled, compile_parts
 from landing_cli.reach.recorded import solve_recorded
 from landing_cli.reach.records import FacetSolutions, LandingCase, Verdict, join
 from landing_cli.reach.stored import CaseResult, ReachRun, run_from_result, run_to_tree
-from landing_cli.reach.summary import summarise
+from landing_cli.reach.summary import has_margin, summarise
 from landing_cli.reach.trace import Answers
 from landing_cli.reach.traced import (
     answers_of,
@@ -43,6 +44,7 @@ from landing_cli.results.journal import Journal
 from landing_cli.results.output import finish_output, open_output
 from landing_cli.results.provenance import Stopwatch
 from landing_cli.results.store import read
+from landing_cli.results.tree import Group
 from landing_cli.scenario.build import build
 from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.schema import Reach
@@ -224,8 +226,17 @@ def _traverse(solver: Solver, cases: tuple[tuple[str, LandingCase], ...]) -> tup
     for index, (name, case) in enumerate(cases):
         own = of_case(solutions, index, solver.facets)
         missing = lost_of_case(lost, index, solver.facets)
-        results.append(CaseResult(case, name, own, summarise(case.asteroid.mesh, own), lost=missing))
+        summary = summarise(case.asteroid.mesh, own)
+        results.append(CaseResult(case, name, own, summary, lost=missing, level_set=_lines(case, own)))
     return tuple(results)
+
+
+def _lines(case: LandingCase, solutions: FacetSolutions) -> Group | None:
+    """The boundary tau = 1, where every facet was asked for its margin."""
+    mesh, rows = case.asteroid.mesh, solutions.rows
+    if case.margin and has_margin(rows) and len(rows) == len(mesh.faces):
+        return lines_group(margin_lines(mesh, rows))
+    return None
 
 
 def _section(
@@ -253,10 +264,11 @@ def _section(
     if traversed is not None:
         section |= section_comparison(mesh, found, traversed.solutions)
         summary = {**traversed.summary, "section": section}
-        return CaseResult(case, name, traversed.solutions, summary, section_group(found), traversed.lost)
+        return replace(traversed, summary=summary, boundary=section_group(found))
     solutions = join(asked)
     summary = {**summarise(mesh, solutions), "section": section}
-    return CaseResult(case, name, solutions, summary, section_group(found), lost)
+    lines = _lines(case, solutions)
+    return CaseResult(case, name, solutions, summary, section_group(found), lost, lines)
 
 
 def _trace(

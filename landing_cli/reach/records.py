@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Literal
 
@@ -37,6 +37,22 @@ class Binding(IntEnum):
     HANDOVER = 6
 
 
+@dataclass(frozen=True)
+class FreeFinalStage:
+    """Durations that the final stage may take, facet by facet.
+
+    Attributes
+    ----------
+    shortest_s, longest_s : float, s
+    compared_s : float or None, s
+        A duration that is tried for every facet, to tell what the others add to the domain.
+    """
+
+    shortest_s: float
+    longest_s: float
+    compared_s: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class LandingCase:
     """One initial state and one time of flight over one asteroid.
@@ -51,6 +67,8 @@ class LandingCase:
         Initial state; the velocity is relative to the rotating frame.
     tof_s, final_stage_s : float, s
         Time of flight, and the part of it that the final landing stage takes.
+    free_final_stage : FreeFinalStage or None
+        Where the duration is chosen for each facet; ``final_stage_s`` is then one that is allowed.
     ellipsoid_m : (3,) float, m
         Semi-axes of the keep-out ellipsoid of the descent stage.
     glide_slope_half_angle_rad : float, rad
@@ -63,6 +81,8 @@ class LandingCase:
         The family of descent trajectories.
     terrain : {"report", "require"}
         Whether a path that cuts the mesh is a landing.
+    margin : bool
+        Whether every facet is asked for its least thrust level.
     """
 
     name: str
@@ -78,11 +98,17 @@ class LandingCase:
     final_stage_thrust: Literal["compensated", "paper"] = "compensated"
     descent: Literal["free", "extremal"] = "free"
     terrain: Literal["report", "require"] = "report"
+    margin: bool = False
+    free_final_stage: FreeFinalStage | None = None
 
     @property
     def descent_s(self) -> float:
         """Time of flight of the descent stage, s."""
         return self.tof_s - self.final_stage_s
+
+    def with_final_stage(self, duration_s: float) -> LandingCase:
+        """Return the case with one duration of the final stage, s, for all facets."""
+        return replace(self, final_stage_s=duration_s, free_final_stage=None)
 
 
 FACET_COLUMNS: tuple[Column, ...] = (
@@ -110,7 +136,22 @@ FACET_COLUMNS: tuple[Column, ...] = (
         "thrust_margin",
         "f8",
         "1",
-        "1 - least thrust level that makes the facet reachable",
+        "1 - tau, tau the least share of the thrust bound at which free control reaches the facet",
+    ),
+    Column("thrust_level_bound", "f8", "1", "certified lower bound on tau, ellipsoid left out"),
+    Column(
+        "thrust_level_flown",
+        "f8",
+        "1",
+        "upper bound on tau: largest share of the thrust bound in a flight that keeps every other limit",
+    ),
+    Column("final_stage_s", "f8", "s", "duration of the final stage"),
+    Column(
+        "compared_verdict",
+        "u1",
+        "1",
+        "what is known with the compared duration of the final stage; unresolved where none is compared",
+        flags=Verdict,
     ),
     Column("iterations", "i4", "1", "solver iterations"),
     Column("handover_position_m", "f8", "m", "handover position, body frame", (3,)),

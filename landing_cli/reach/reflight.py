@@ -25,7 +25,7 @@ from landing_cli.flight.legs import Leg
 from landing_cli.flight.replay import replay_many
 from landing_cli.flight.trajectory import Trajectory
 from landing_cli.reach.delivery import CLEARANCE_SPACING
-from landing_cli.reach.flown import flown_legs
+from landing_cli.reach.flown import case_of_row, flown_legs
 from landing_cli.reach.records import FacetSolutions, LandingCase
 
 FloatArray = NDArray[np.float64]
@@ -136,7 +136,8 @@ def measure_rows(
         zip(*fly_rows(case, solutions, rows, case.asteroid.gravity), strict=True)
     ):
         known = solutions.rows[rows[i]]
-        values = _measure(case, legs, flown, known["handover_position_m"], ground, int(known["facet"]))
+        own = case_of_row(case, solutions, int(rows[i]))
+        values = _measure(own, legs, flown, known["handover_position_m"], ground, int(known["facet"]))
         for name, value in values.items():
             measured[name][i] = value
     return measured

@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.errors import InputRefused
 from landing_cli.flight.spacecraft import Spacecraft
-from landing_cli.reach.records import FACET_COLUMNS, FACET_DTYPE, FacetSolutions, LandingCase
+from landing_cli.reach.records import (
+    FACET_COLUMNS,
+    FACET_DTYPE,
+    FacetSolutions,
+    FreeFinalStage,
+    LandingCase,
+)
 from landing_cli.reach.stored_checks import check_case
 from landing_cli.results.body_checks import check_spacecraft
 from landing_cli.results.body_group import body_from_group, body_to_group, number, vector
@@ -48,6 +54,8 @@ class CaseResult:
         Numbers, text and mappings of them, as printed.
     boundary : Group or None
         Datasets over the dimension ``point`` where a section or a tracer found the boundary.
+    level_set : Group or None
+        The lines on the surface where the least thrust level is 1; see ``level_set``.
     lost : mapping of int to str
         Why a facet could not be solved, by facet.
     """
@@ -58,6 +66,7 @@ class CaseResult:
     summary: Mapping[str, Any] = field(default_factory=dict)
     boundary: Group | None = None
     lost: Mapping[int, str] = field(default_factory=dict)
+    level_set: Group | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +137,12 @@ def solutions_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> FacetSolutions:
 
 def case_to_attributes(case: LandingCase) -> dict[str, Any]:
     """Return what a case asks, as attributes of its group; body and spacecraft are stored apart."""
-    return {name: getattr(case, name) for name in (*_CASE_NUMBERS, *_CASE_VECTORS, *_CASE_CHOICES)}
+    names = (*_CASE_NUMBERS, *_CASE_VECTORS, *_CASE_CHOICES)
+    attributes: dict[str, Any] = {name: getattr(case, name) for name in names} | {"margin": int(case.margin)}
+    if case.free_final_stage is not None:
+        known = {name: value for name, value in vars(case.free_final_stage).items() if value is not None}
+        attributes |= {f"final_stage_{name}": value for name, value in known.items()}
+    return attributes
 
 
 def case_from_attributes(name: str, group: Group, asteroid: Asteroid, craft: Spacecraft) -> LandingCase:
@@ -155,6 +169,15 @@ def case_from_attributes(name: str, group: Group, asteroid: Asteroid, craft: Spa
     facts: dict[str, Any] = {key: number(group, key) for key in _CASE_NUMBERS}
     facts |= {key: vector(group, key) for key in _CASE_VECTORS}
     facts |= {key: str(group.attributes[key]) for key in _CASE_CHOICES}
+    facts["margin"] = number(group, "margin") != 0
+    if "final_stage_shortest_s" in group.attributes:
+        keys = ("shortest_s", "longest_s", "compared_s")
+        known = {
+            key: number(group, f"final_stage_{key}")
+            for key in keys
+            if f"final_stage_{key}" in group.attributes
+        }
+        facts["free_final_stage"] = FreeFinalStage(**known)
     return LandingCase(name, asteroid, craft, **facts)
 
 
@@ -235,6 +258,8 @@ def _case_to_group(result: CaseResult, order: int) -> Group:
     }
     if result.boundary is not None:
         members["boundary"] = result.boundary
+    if result.level_set is not None:
+        members["level_set"] = result.level_set
     if result.lost:
         facets = np.array(sorted(result.lost), dtype=np.int32)
         reasons = np.array([result.lost[facet] for facet in facets.tolist()])
@@ -274,6 +299,7 @@ def _case_from_group(name: str, group: Group, asteroid: Asteroid, craft: Spacecr
         group_to_mapping(group.group("summary")),
         group.group("boundary") if "boundary" in group.members else None,
         lost,
+        group.group("level_set") if "level_set" in group.members else None,
     )
 
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_h
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.reach.records import FACET_COLUMNS, FacetSolutions, LandingCase
+from landing_cli.reach.boundary_lines import lines_from_group
+from landing_cli.reach.records import FACET_COLUMNS, FacetSolutions, LandingCase, Verdict
 from landing_cli.reach.summary import summarise
 from landing_cli.results.body_checks import bounded, positive
 from landing_cli.results.tree import Dataset, Group
@@ -58,10 +59,13 @@ def check_case(result: CaseResult) -> None:
     check_choices(case)
     check_rows(result.solutions, facets)
     _all_within("lost", np.array(list(result.lost), dtype=np.int64), facets)
+    _check_final_stages(result)
     if result.boundary is not None:
         _check_boundary(result.boundary, facets)
     if result.boundary is not None and ("loop" in result.boundary.members or "trace" in result.summary):
         _check_trace(result, result.boundary)
+    if result.level_set is not None:
+        lines_from_group(result.level_set)
     check_printable("summary", result.summary)
     check_summary(result.summary, summarise(case.asteroid.mesh, result.solutions))
 
@@ -101,6 +105,22 @@ def check_rows(solutions: FacetSolutions, facets: int) -> None:
             bounded(column.name, values, _LARGEST[column.name])
         if column.flags is not None and not np.isin(rows[column.name], list(column.flags)).all():
             raise ValueError(f"{column.name} holds a value without a meaning")
+
+
+def _check_final_stages(result: CaseResult) -> None:
+    """Durations are part of the flight: those that are allowed, and those of the flights."""
+    case, free = result.case, result.case.free_final_stage
+    if free is None:
+        return
+    for name, value in vars(free).items():
+        if value is not None:
+            positive(name, value, _LARGEST["final_stage_s"])
+    if not free.shortest_s < free.longest_s < case.tof_s or (free.compared_s or 0.0) >= case.tof_s:
+        raise ValueError("the final stage's durations do not ascend, or exceed tof_s")
+    rows = result.solutions.rows
+    durations = rows["final_stage_s"][rows["verdict"] == Verdict.REACHABLE]
+    if not ((durations > 0.0) & (durations < case.tof_s)).all():
+        raise ValueError("a final_stage_s is not within tof_s")
 
 
 def _check_boundary(boundary: Group, facets: int) -> None:

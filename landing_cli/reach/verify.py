@@ -32,6 +32,7 @@ from landing_cli.reach.reflight import (
     survey_ground,
 )
 from landing_cli.reach.stored import CaseResult
+from landing_cli.reach.verify_margin import MARGIN_LIMITS, check_levels
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -232,6 +233,8 @@ def _verify_case(
     work = partial(measure_rows, result.case, result.solutions, ground=ground)
     measured = _gathered(work, rows, CHUNK_ROWS, plan, told)
     checks = {} if len(rows) == 0 else _checks(result, stored, measured)
+    if result.case.margin:
+        checks |= _level_checks(result, ground)
     clearances = stored["terrain_clearance_min_m"], measured["terrain_clearance_min_m"]
     return CaseReport(
         case=result.case.name,
@@ -271,6 +274,14 @@ def _checks(result: CaseResult, stored: NDArray[np.void], measured: NDArray[np.v
         elif name in ABSOLUTE:
             worst[f"stored_{name}"] = _worst(apart, ABSOLUTE[name], facets)
     return worst | _against_dop853(result, facets, worst["touchdown_miss_m"].facet)
+
+
+def _level_checks(result: CaseResult, ground: Ground) -> dict[str, Worst]:
+    """Search a sample's thrust levels again, and fly the flights that have them."""
+    facets, found = check_levels(result, ground)
+    if len(facets) == 0:
+        return {}
+    return {name: _worst(values, MARGIN_LIMITS[name], facets) for name, values in found.items()}
 
 
 def _against_dop853(result: CaseResult, facets: IntArray, farthest: int) -> dict[str, Worst]:

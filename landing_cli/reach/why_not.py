@@ -9,7 +9,7 @@ be missed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +89,7 @@ def why_not(case: LandingCase, rows: NDArray[np.void]) -> WhyNot:
     -------
     WhyNot
     """
+    case = replace(case, margin=False)
     shared, facets = survey_without_proofs(case), rows["facet"].astype(np.int64)
     searched, changes = [], []
     for ladder in ladders(case, shared):

@@ -106,7 +106,7 @@ def to_vtp(mesh: Mesh, table: Table) -> bytes:
     bytes
     """
     offsets = np.arange(3, 3 * len(mesh.faces) + 1, 3, dtype=np.int64)
-    cells = [_data_array(name, _narrowed(column.values)) for name, column in table.columns.items()]
+    cells = [data_array(name, _narrowed(column.values)) for name, column in table.columns.items()]
     lines = [
         '<?xml version="1.0"?>',
         '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">',
@@ -115,10 +115,10 @@ def to_vtp(mesh: Mesh, table: Table) -> bytes:
         '<CellData Scalars="verdict">' if "verdict" in table.columns else "<CellData>",
         *cells,
         "</CellData>",
-        f"<Points>{_data_array('position_m', mesh.vertices)}</Points>",
+        f"<Points>{data_array('position_m', mesh.vertices)}</Points>",
         "<Polys>",
-        _data_array("connectivity", mesh.faces.reshape(-1)),
-        _data_array("offsets", offsets),
+        data_array("connectivity", mesh.faces.reshape(-1)),
+        data_array("offsets", offsets),
         "</Polys>",
         "</Piece>",
         "</PolyData>",
@@ -188,7 +188,16 @@ def _narrowed(values: NDArray[Any]) -> NDArray[Any]:
     return values if values.dtype.str[1:] in _PLY_TYPES else values.astype(np.int32)
 
 
-def _data_array(name: str, values: NDArray[Any]) -> str:
+def data_array(name: str, values: NDArray[Any]) -> str:
+    """Write an array as an element of a VTK file.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    values : (n,) or (n, k) array
+        Of float64, int64, int32 or uint8.
+    """
     raw = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
     packed = base64.b64encode(struct.pack("<Q", len(raw)) + raw).decode()
     components = values.shape[1] if values.ndim == 2 else 1

@@ -11,6 +11,7 @@ from pydantic import Discriminator, Field, Tag, TypeAdapter, ValidationError
 from landing_cli.scenario.messages import KeyPath, Problem, refusal
 from landing_cli.scenario.schema_base import (
     Auto,
+    FinalStage,
     Number3,
     Positive3,
     Seconds,
@@ -29,6 +30,10 @@ from landing_cli.scenario.schema_tour import TourScenario
 from landing_cli.scenario.translate import problems_of
 
 S = TypeVar("S", bound=Section)
+
+
+# Of the time of flight, where the final stage's duration is free.
+FREE_STAGE_SHARES = (0.05, 0.75)
 
 
 class SpacecraftSection(Section):
@@ -107,8 +112,12 @@ class Reach(Section):
         min_length=1, max_length=1000, description="list of states from which the descent begins"
     )
     tof_s: Times | None = Field(None, description="time of flight, s: a number, or a list of them")
-    final_stage_s: Seconds = Field(
-        description="part of the time of flight that the final landing stage takes, s"
+    final_stage_s: FinalStage = Field(
+        description="part of the time of flight that the final landing stage takes, s: a number; "
+        "or chosen for each facet: [shortest, longest] | free (5 to 75 % of the time of flight)"
+    )
+    final_stage_compared_s: Seconds | None = Field(
+        None, description="with a free final stage: the duration whose domain it is compared with, s"
     )
     ellipsoid_m: Auto | Annotated[Positive3, Tag("value")] = Field(
         "auto",
@@ -135,6 +144,9 @@ class Reach(Section):
     terrain: Literal["report", "require"] = Field(
         "report", description="whether a path that cuts the mesh is a landing: report | require (it is not)"
     )
+    margin: bool = Field(
+        False, description="whether every facet is asked for its least thrust level, and its boundary traced"
+    )
     method: Literal["traverse", "section", "trace"] = Field(
         "traverse",
         description="how the domain is found: traverse (every facet) | section (the paper's) | "
@@ -148,6 +160,7 @@ class Reach(Section):
     def model_post_init(self, context: Any, /) -> None:
         """Refuse states without a name of their own or without a time, and choices that contradict."""
         self._check_names()
+        self._check_final_stage()
         if self.method == "trace":
             self._check_trace()
         if self.tof_s is not None:
@@ -159,6 +172,15 @@ class Reach(Section):
                 raise wrong(
                     "tof_s", "is missing", f"give reach.tof_s, or tof_s in initial state {state.name}"
                 )
+
+    def final_stages_s(self, tof_s: float) -> tuple[float, float]:
+        """Return the shortest and the longest duration of the final stage in a flight, s."""
+        if isinstance(self.final_stage_s, tuple):
+            return self.final_stage_s
+        if isinstance(self.final_stage_s, float):
+            return self.final_stage_s, self.final_stage_s
+        shortest, longest = FREE_STAGE_SHARES
+        return shortest * tof_s, longest * tof_s
 
     def times_of(self, state: InitialState) -> tuple[float, ...]:
         """Return the times of flight that are flown from one initial state, s."""
@@ -183,6 +205,12 @@ class Reach(Section):
                     f"trace follows the least thrust level, which does not decide with {key}: {value}",
                     f"take {key}: {other}, or method: traverse",
                 )
+        if not isinstance(self.final_stage_s, float):
+            raise wrong(
+                "method",
+                "trace follows the least thrust level of one duration, and final_stage_s is free",
+                "give final_stage_s a number, or method: traverse",
+            )
 
     def _check_names(self) -> None:
         first: dict[str, int] = {}
@@ -195,14 +223,35 @@ class Reach(Section):
                 )
             first[state.name] = index
 
+    def _check_final_stage(self) -> None:
+        free, compared = not isinstance(self.final_stage_s, float), self.final_stage_compared_s
+        if isinstance(self.final_stage_s, tuple) and self.final_stage_s[0] >= self.final_stage_s[1]:
+            shortest, longest = self.final_stage_s
+            raise wrong(
+                "final_stage_s", f"[{shortest:g}, {longest:g}] does not ascend", "[shortest, longest]"
+            )
+        if free and self.descent == "extremal":
+            raise wrong(
+                "final_stage_s", "is free, but descent is extremal", "give a number, or descent: free"
+            )
+        if compared is not None and not free:
+            raise wrong(
+                "final_stage_compared_s",
+                "is given, but final_stage_s is a number",
+                "leave it out, or make final_stage_s free",
+            )
+
     def _check_times(self, times: tuple[float, ...], key: str) -> None:
         for index, tof_s in enumerate(times):
-            if tof_s <= self.final_stage_s:
-                raise wrong(
-                    "final_stage_s",
-                    f"{self.final_stage_s:g} is not shorter than the time of flight of {tof_s:g} s",
-                    f"the final stage is part of the flight: shorten it, or lengthen {key}",
-                )
+            longest = {"final_stage_s": self.final_stages_s(tof_s)[1]}
+            longest["final_stage_compared_s"] = self.final_stage_compared_s or 0.0
+            for name, duration_s in longest.items():
+                if tof_s <= duration_s:
+                    raise wrong(
+                        name,
+                        f"{duration_s:g} is not shorter than the time of flight of {tof_s:g} s",
+                        f"the final stage is part of the flight: shorten it, or lengthen {key}",
+                    )
             if any(f"{tof_s:.12g}" == f"{earlier:.12g}" for earlier in times[:index]):
                 raise wrong(f"{key}.{index}", f"{tof_s:g} is in the list twice", "remove one")
 
@@ -234,8 +283,9 @@ class Scenario(Section):
             raise wrong(
                 "reach", "is missing, and so are plan and observe", "a scenario asks for at least one"
             )
-        if self.isochrone is not None and self.reach is not None:
-            self.isochrone.check_against(self.reach.final_stage_s)
+        final_stage_s = None if self.reach is None else self.reach.final_stage_s
+        if self.isochrone is not None and isinstance(final_stage_s, float):
+            self.isochrone.check_against(final_stage_s)
 
 
 AnyScenario = Scenario | TourScenario

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Tag
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
 Number3 = tuple[float, float, float]
@@ -28,12 +28,23 @@ def word_or_value(value: Any) -> str:
     return "word" if isinstance(value, str) else "value"
 
 
+def word_value_or_range(value: Any) -> str:
+    """Tell which alternative of a key like ``free | number | [least, most]`` a value belongs to."""
+    return "range" if isinstance(value, list | tuple) else word_or_value(value)
+
+
 Times = Annotated[
     tuple[Seconds, ...],
     Field(min_length=1, max_length=1000),
     BeforeValidator(as_tuple, json_schema_input_type=Seconds | list[Seconds]),
 ]
 Auto = Annotated[Literal["auto"], Tag("word")]
+FinalStage = Annotated[
+    Annotated[Literal["free"], Tag("word")]
+    | Annotated[Seconds, Tag("value")]
+    | Annotated[tuple[Seconds, Seconds], Tag("range")],
+    Discriminator(word_value_or_range),
+]
 
 
 class Section(BaseModel):

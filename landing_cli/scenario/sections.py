@@ -117,6 +117,33 @@ def disperse_section(loaded: LoadedScenario) -> DisperseSection:
     return loaded.scenario.disperse
 
 
+def fixed_stage_reach(loaded: LoadedScenario, study: str) -> Reach:
+    """Return the section ``reach`` for a study that takes one duration of the final stage for all facets.
+
+    Parameters
+    ----------
+    loaded : LoadedScenario
+        The checked scenario.
+    study : str
+        The command; for the message.
+
+    Returns
+    -------
+    Reach
+
+    Raises
+    ------
+    InputRefused
+        It has no such section, or its final stage is free.
+    """
+    reach = reach_section(loaded)
+    if not isinstance(reach.final_stage_s, float):
+        fix = f"give it a number: --set reach.final_stage_s={reach.final_stage_compared_s or 200:g}"
+        problem = Problem(("reach", "final_stage_s"), f"is free, and `{study}` takes one duration", fix)
+        raise refusal([problem], loaded.places, loaded.source)
+    return reach
+
+
 def for_mission(scenario: Scenario, *missions: str) -> Scenario:
     """Drop the sections of other missions: what they say changes no number of this one.
 

@@ -102,7 +102,7 @@ def _resolve(
     field: FieldInfo | None = None
     for part in loc:
         if field is not None and isinstance(part, str):
-            if part in ("word", "value"):
+            if part in ("word", "value", "range"):
                 continue
             choices = _models(field.annotation)
             tagged = [m for m in choices if len(choices) > 1 and part in _words(m)]

@@ -64,6 +64,8 @@ OPTIONAL = (
     "handover",
     "descent",
     "final_stage_thrust",
+    "final_stage_compared_s",
+    "margin",
     "method",
     "h_m",
     "azimuth_deg",
@@ -136,7 +138,7 @@ def leaves(node: Any, path: Path_ = ()) -> Iterator[tuple[Path_, Any]]:
 def mutations(path: Path_, value: Any) -> Iterator[tuple[str, Any]]:
     named = next(part for part in reversed(path) if isinstance(part, str))
     in_list = isinstance(path[-1], int)
-    number = isinstance(value, int | float)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
     yield "nan", "@.nan@"
     yield "infinite", "@-.inf@"
     yield "list", [[value]]

@@ -61,6 +61,7 @@ def write_figures(
 def _maps(run: ReachRun, cases: tuple[CaseResult, ...], overview: bool) -> Iterator[tuple[str, Figure]]:
     from landing_cli.reach.figures.boundary import boundary_figure
     from landing_cli.reach.figures.case_maps import delta_v_figure, verdict_figure
+    from landing_cli.reach.figures.margin_map import margin_figure
     from landing_cli.reach.figures.overview import overview_figure
     from landing_cli.reach.figures.parts import delta_v_scale
     from landing_cli.reach.figures.traced import trace_figure
@@ -73,6 +74,8 @@ def _maps(run: ReachRun, cases: tuple[CaseResult, ...], overview: bool) -> Itera
         name = result.case.name
         yield f"{name}-verdict", verdict_figure(result, surface)
         yield f"{name}-delta-v", delta_v_figure(result, surface, scale)
+        if result.level_set is not None:
+            yield f"{name}-margin", margin_figure(result, surface)
         if result.boundary is not None and "trace" in result.summary:
             yield f"{name}-boundary", trace_figure(result, result.boundary, surface)
         elif result.boundary is not None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -61,8 +62,9 @@ def verdict_figure(result: CaseResult, surface: SurfaceMap) -> Figure:
     -------
     Figure
     """
-    paint = paint_verdicts(spread_over_mesh(result))
-    return _case_figure(result, surface, paint, None)
+    fields = spread_over_mesh(result)
+    lines = MapLines(facet_border(result), np.zeros((0, 2, 3)))
+    return case_figure(result, surface, paint_verdicts(fields), lines, None, 0.435)
 
 
 def delta_v_figure(result: CaseResult, surface: SurfaceMap, scale: ScalarMappable) -> Figure:
@@ -81,24 +83,78 @@ def delta_v_figure(result: CaseResult, surface: SurfaceMap, scale: ScalarMappabl
     -------
     Figure
     """
-    paint = paint_delta_v(spread_over_mesh(result), scale)
-    figure = _case_figure(result, surface, paint, scale)
-    bar = figure.colorbar(scale, cax=figure.add_axes((0.70, 0.395, 0.26, 0.022)), orientation="horizontal")
-    bar.set_label("velocity increment (m/s)")
-    bar.outline.set_visible(False)
+    fields = spread_over_mesh(result)
+    levels = level_segments(result.case.asteroid.mesh, fields.delta_v_m_s, scale_levels(scale))
+    drawn = scale if len(levels) else None
+    lines = MapLines(facet_border(result), levels)
+    figure = case_figure(result, surface, paint_delta_v(fields, scale), lines, drawn, 0.335)
+    add_bar(figure, scale, "velocity increment (m/s)")
     return figure
 
 
-def _case_figure(
-    result: CaseResult, surface: SurfaceMap, paint: Paint, scale: ScalarMappable | None
-) -> Figure:
-    mesh, start = result.case.asteroid.mesh, result.case.position_m
-    fields = spread_over_mesh(result)
-    border = border_segments(mesh, fields.reachable, fields.asked & ~fields.reachable)
-    levels = np.zeros((0, 2, 3))
-    if scale is not None:
-        levels = level_segments(mesh, fields.delta_v_m_s, scale_levels(scale))
+class MapLines(NamedTuple):
+    """Lines over the facets of a map."""
 
+    border: FloatArray  # (n, 2, 3) m, of the domain
+    levels: FloatArray  # (n, 2, 3) m
+    look: Mapping[str, Any] = LEVELS
+
+
+def facet_border(result: CaseResult) -> FloatArray:
+    """Find the edges between the reachable facets of a case and the others, (n, 2, 3) float, m."""
+    fields = spread_over_mesh(result)
+    return border_segments(result.case.asteroid.mesh, fields.reachable, fields.asked & ~fields.reachable)
+
+
+def add_bar(figure: Figure, scale: ScalarMappable, name: str) -> None:
+    """Add the colour bar of a case's figure.
+
+    Parameters
+    ----------
+    figure : Figure
+        From :func:`case_figure`, whose legend leaves room for it.
+    scale : ScalarMappable
+        Its colours.
+    name : str
+        Quantity and unit.
+    """
+    bar = figure.colorbar(scale, cax=figure.add_axes((0.70, 0.395, 0.26, 0.022)), orientation="horizontal")
+    bar.set_label(name)
+    bar.outline.set_visible(False)
+
+
+def case_figure(
+    result: CaseResult,
+    surface: SurfaceMap,
+    paint: Paint,
+    lines: MapLines,
+    drawn: ScalarMappable | None,
+    legend_top: float,
+) -> Figure:
+    """Draw three views of the body and a map, with lines and a legend.
+
+    Parameters
+    ----------
+    result : CaseResult
+        The case.
+    surface : SurfaceMap
+        The mesh in longitude and latitude.
+    paint : Paint
+        Colours of the facets.
+    lines : MapLines
+        Lines over them.
+    drawn : ScalarMappable or None
+        Velocity increments whose levels are among the lines.
+    legend_top : float
+        Height of the legend's upper edge, as a share of the figure.
+
+    Returns
+    -------
+    Figure
+        Its last axes are the map.
+    """
+    mesh, start = result.case.asteroid.mesh, result.case.position_m
+    border, levels = lines.border, lines.levels
     figure = plotting.new_figure(10.0, 7.35)
     plotting.add_title(figure, case_title(result), case_facts(result.case))
     near, beside = sights(start)
@@ -110,21 +166,19 @@ def _case_figure(
     for column, (name, view) in enumerate(views):
         axes = figure.add_axes((0.065 + 0.325 * column, 0.525, 0.265, 0.36))
         draw_surface(axes, mesh, view, paint.colours, paint.hatched)
-        draw_segments(axes, mesh, view, levels, **LEVELS)
+        draw_segments(axes, mesh, view, levels, **lines.look)
         draw_segments(axes, mesh, view, border, **BORDER)
         _frame_view(axes, mesh, view, start, whole_way=column == 1)
         axes.set_title(name)
     axes = figure.add_axes((0.065, 0.06, 0.60, 0.365))
     draw_facets(axes, surface, paint.colours, paint.hatched)
-    draw_map_segments(axes, levels, **LEVELS)
+    draw_map_segments(axes, levels, **lines.look)
     draw_map_segments(axes, border, **BORDER)
     axes.plot(*lon_lat_deg(start), **START, clip_on=False, zorder=6)
     frame_map(axes)
     axes.set_title("d  longitude and latitude")
-    drawn = scale if len(levels) else None
     handles = legend_handles(paint.key, border=bool(len(border)), levels=drawn, counts=True)
-    top = 0.435 if scale is None else 0.335
-    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.685, top), labelspacing=0.7)
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.685, legend_top), labelspacing=0.7)
     return figure
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from landing_cli.body.mesh import FloatArray, facet_centroids, facet_normals
 from landing_cli.flight.trajectory import Trajectory
 from landing_cli.reach.figures.parts import body_name
-from landing_cli.reach.flown import row_of
+from landing_cli.reach.flown import case_of_row, row_of
 from landing_cli.reach.records import LandingCase
 from landing_cli.reach.stored import CaseResult
 from landing_cli.results import plotting
@@ -35,8 +35,8 @@ class Flight:
 
     @property
     def case(self) -> LandingCase:
-        """The case that it belongs to."""
-        return self.result.case
+        """The case that it belongs to, with the facet's own duration of the final stage."""
+        return case_of_row(self.result.case, self.result.solutions, row_of(self.result, self.facet))
 
     @property
     def handover(self) -> int:

@@ -221,10 +221,15 @@ def craft_facts(case: LandingCase) -> str:
     craft = case.spacecraft
     reading = "outside" if case.handover == "outside" else "on"
     return (
-        f"final stage {case.final_stage_s:g} s; "
+        f"final stage {_stage(case)} s; "
         f"{craft.mass_kg:g} kg, {craft.thrust_max_n:g} N, Isp {craft.isp_s:g} s; "
         f"handover {reading} the ellipsoid; {case.descent} descent"
     )
+
+
+def _stage(case: LandingCase) -> str:
+    free = case.free_final_stage
+    return f"{case.final_stage_s:g}" if free is None else f"{free.shortest_s:g} to {free.longest_s:g}"
 
 
 def sights(start: FloatArray, off_deg: float = 30.0) -> tuple[FloatArray, FloatArray]:

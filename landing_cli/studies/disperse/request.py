@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.messages import Problem, refusal
 from landing_cli.scenario.schema import Reach
 from landing_cli.scenario.schema_disperse import LARGEST_RELATIVE, DisperseSection
-from landing_cli.scenario.sections import disperse_section, reach_section
+from landing_cli.scenario.sections import disperse_section, fixed_stage_reach
 from landing_cli.studies.disperse.axes import state_axes
 from landing_cli.studies.disperse.records import Drawing, Spread
 
@@ -59,11 +59,15 @@ def request_of(loaded: LoadedScenario, built: Built | None = None) -> Request:
     InputRefused
         It lacks a section, or contradicts its mesh or itself.
     """
-    reach, section = reach_section(loaded), disperse_section(loaded)
+    reach, section = fixed_stage_reach(loaded, "reach disperse"), disperse_section(loaded)
     chosen = _chosen(loaded, reach, section)
     built = built or build(loaded)
     spread = spread_of(section, built, loaded)
-    cases = tuple(case for case in landing_cases(reach, built) if case[1].name in chosen)
+    cases = tuple(
+        (name, replace(case, margin=False))
+        for name, case in landing_cases(reach, built)
+        if case.name in chosen
+    )
     for _, case in cases:
         state_axes(case, spread.axes)  # refused before anything is written
     return Request(loaded, built, cases, Drawing(section.seed, section.samples, section.confidence, spread))

@@ -78,7 +78,7 @@ def states_of(reach: Reach, built: Built) -> tuple[LandingCase, ...]:
     """Make one case an initial state, named like it, in the scenario's order."""
     first: dict[str, LandingCase] = {}
     for name, case in landing_cases(reach, built):
-        first.setdefault(name, replace(case, name=name))
+        first.setdefault(name, replace(case, name=name, margin=False))
     return tuple(first.values())
 
 
@@ -121,7 +121,7 @@ def run(
         The scenario contradicts its mesh, or the output is refused.
     """
     watch = Stopwatch()
-    reach = reach_section(loaded)
+    reach = fixed_stage_reach(loaded, COMMAND)
     built = build(loaded)
     states = states_of(reach, built)
     grid = grid_of(loaded, states)

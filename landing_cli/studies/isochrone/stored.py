@@ -9,9 +9,10 @@ import numpy as np
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.errors import InputRefused
 from landing_cli.flight.spacecraft import Spacecraft
-from landing_cli.reach.records import LandingCase, Verdict
+from landing_cli.reach.records import Verdict
+from landing_cli.reach.stored import case_from_attributes, case_to_attributes
 from landing_cli.results.body_checks import check_spacecraft
-from landing_cli.results.body_group import body_from_group, body_to_group, number, vector
+from landing_cli.results.body_group import body_from_group, body_to_group, number
 from landing_cli.results.store import StoredResult
 from landing_cli.results.tree import (
     Dataset,
@@ -35,9 +36,6 @@ from landing_cli.studies.isochrone.time_grid import TimeGrid
 
 MISSION = "isochrone"
 
-_CASE_NUMBERS = ("tof_s", "final_stage_s", "glide_slope_half_angle_rad")
-_CASE_VECTORS = ("position_m", "velocity_m_s", "ellipsoid_m")
-_CASE_CHOICES = ("handover", "final_stage_thrust", "descent", "terrain")
 _OVER_GRID = ("tof_s", "facet")
 
 
@@ -108,9 +106,7 @@ def _run_from_tree(tree: Group) -> IsochroneRun:
 
 
 def _state_to_group(result: StateResult, order: int) -> Group:
-    case = result.case
-    names = (*_CASE_NUMBERS, *_CASE_VECTORS, *_CASE_CHOICES)
-    attributes: dict[str, Any] = {"order": order} | {name: getattr(case, name) for name in names}
+    attributes: dict[str, Any] = {"order": order, **case_to_attributes(result.case)}
     members: dict[str, Dataset | Group] = {
         "facets": table_group(result.facets, FACET_COLUMNS, "facet"),
         "intervals": table_group(result.intervals, INTERVAL_COLUMNS, "interval"),
@@ -151,9 +147,6 @@ def _lost_to_group(lost: tuple[Lost, ...]) -> Group:
 
 
 def _state_from_group(name: str, group: Group, asteroid: Asteroid, craft: Spacecraft) -> StateResult:
-    facts: dict[str, Any] = {key: number(group, key) for key in _CASE_NUMBERS}
-    facts |= {key: vector(group, key) for key in _CASE_VECTORS}
-    facts |= {key: str(group.attributes[key]) for key in _CASE_CHOICES}
     grid, answers = _grid_from_group(group.group("grid"))
     lost: tuple[Lost, ...] = ()
     if "lost" in group.members:
@@ -161,7 +154,7 @@ def _state_from_group(name: str, group: Group, asteroid: Asteroid, craft: Spacec
         columns = (table.dataset(key).data.tolist() for key in ("facet", "tof_s", "reason"))
         lost = tuple(Lost(*row) for row in zip(*columns, strict=True))
     return StateResult(
-        LandingCase(name, asteroid, craft, **facts),
+        case_from_attributes(name, group, asteroid, craft),
         grid,
         answers,
         table_rows(group.group("intervals"), INTERVAL_COLUMNS),

@@ -220,7 +220,7 @@ def case_maker(surface: Surface) -> Callable[[LoadedScenario], list[LandingCase]
                 where=loaded.source,
                 fix="give it one, or drop it for reach.tof_s, which may be swept",
             )
-        return [case for _, case in landing_cases(reach, build(loaded))]
+        return [replace(case, margin=False) for _, case in landing_cases(reach, build(loaded))]
 
     return make
 
