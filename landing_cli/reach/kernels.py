@@ -89,7 +89,7 @@ def _certificates(prepared: PreparedCase) -> None:
     """Bounds that prove a facet unreachable."""
     solver, case, target = _solver(prepared), prepared.coarse, prepared.shared.normals[0]
     point, model = solver.point, solver.model
-    linearised_thrust_level(case, layout(case, 0, 1.0, False, 1.0), point, model, solver.duals)
+    linearised_thrust_level(case, layout(case, 0, 1.0, False, 1.0, 0), point, model, solver.duals)
     certified_thrust_level(
         case, target, prepared.coarse_tube, 1.0, model, point.multiplier, point.cone_dual, solver.duals
     )
@@ -98,7 +98,7 @@ def _certificates(prepared: PreparedCase) -> None:
 def _answers(prepared: PreparedCase) -> None:
     """What is kept of a solve's multipliers."""
     solver, case = _solver(prepared), prepared.coarse
-    plan = layout(case, 0, 1.0, False, 1.0)
+    plan = layout(case, 0, 1.0, False, 1.0, 0)
     keep_costates(case, plan, solver, 0.0, np.zeros(7))
     keep_pressure(case, plan, solver, np.zeros(6))
 
@@ -106,7 +106,7 @@ def _answers(prepared: PreparedCase) -> None:
 def _flight(prepared: PreparedCase) -> None:
     """The linearised flight, gravity and constraints."""
     case, solver, normal = prepared.coarse, _solver(prepared), prepared.shared.normals[0]
-    plan = layout(case, 0, 1.0, False, 1.0)
+    plan = layout(case, 0, 1.0, False, 1.0, 0)
     cold_start(case, normal, normal, plan, solver)
     refresh(case, normal, plan, solver.cuts, False, solver.point, solver.path, solver.model)
 
