@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.reach.delivery import VALUE_COLUMNS, deliver_many, new_deliveries
+from landing_cli.reach.delivery import CLEARANCE_SPACING, VALUE_COLUMNS, deliver_many, new_deliveries
 from landing_cli.reach.free_batch import Batch, new_batch
 from landing_cli.reach.free_flights import FLOOR, SAG, Question, best_flights, flights_between
 from landing_cli.reach.free_solve import CONVERGED, STALLED
@@ -29,11 +29,18 @@ Flags = NDArray[np.bool_]
 
 # How often walls follow a flight, at most, and when its energy or thrust level counts as settled.
 ROUNDS, SETTLED = 12, 2e-4
-# Walls stand so far off the surface, below points that are so near to it (mean edges). A flight that still
-# dips into rock between its points, by less than SHALLOW, has them raised by so many times the depth.
-MARGIN, NEAR, BOLDNESS, SHALLOW = 1e-3, 1.0, 1.5, 0.2
+# Mean edges that a flight keeps off the surface beyond one of them from its touchdown: clearance is looked at
+# in steps, and half of one is what may be missed in between.
+KEPT = 0.5 * CLEARANCE_SPACING
+# Walls stand below points that are so near to the surface (mean edges). A flight that falls short of KEPT
+# between its points, by less than SHALLOW, has them raised by so many times the shortfall.
+NEAR, BOLDNESS, SHALLOW = 1.0, 1.5, 0.2
+ROOM = 0.1  # that walls stand higher than KEPT at first, so that bends between points seldom fall short
 # Shares of the thrust bound that the final stage is given in turn, as `free_descent` does.
 ARC_SHARES = (1.0 - 4e-5, 1.0 - 3e-3)
+# Ways that every facet tries, and those that are left where none of these leads anywhere: over Bacchus they
+# were never the only way, nor cheaper by 1 %.
+FIRST_WAYS, LAST_WAYS = (Way.CLOSEST, Way.OUTWARD, Way.NORMAL), (Way.LEFT, Way.RIGHT)
 
 _COST, _VIOLATION = VALUE_COLUMNS.index("performance_index_m2_s3"), VALUE_COLUMNS.index("violation")
 _CLEARANCE = VALUE_COLUMNS.index("terrain_clearance_min_m")
@@ -140,8 +147,7 @@ def _by_energy(asked: _Asked, start: _Found) -> _Found:
     for share in ARC_SHARES:
         question = asked.question
         less = asked._replace(question=question._replace(case=question.case._replace(arc_share=share)))
-        for way in Way:
-            _improve(best, todo, _follow(_part(less, todo), _rows(start, todo), way))
+        _try(best, less, start, todo)
         todo = np.flatnonzero(np.isinf(best.value) & best.nearly)
         if len(todo) == 0:
             break
@@ -152,10 +158,21 @@ def _by_level(asked: _Asked, start: _Found) -> _Found:
     """Ask every way for the least thrust level."""
     case = asked.question.case._replace(propellant=2.0)  # more than there is: unbounded
     asked = asked._replace(question=asked.question._replace(case=case, tau_free=True))
-    best, everything = _blank(asked), np.arange(len(asked.facets))
-    for way in Way:
-        _improve(best, everything, _follow(asked, start, way))
+    best = _blank(asked)
+    _try(best, asked, start, np.arange(len(asked.facets)))
     return best
+
+
+def _try(best: _Found, asked: _Asked, start: _Found, places: Ints) -> None:
+    """Try every way for some facets, and keep what is better than the best so far."""
+    for ways in (FIRST_WAYS, LAST_WAYS):
+        for way in ways:
+            found = _follow(_part(asked, places), _rows(start, places), way)
+            best.flights.iterations[places] += found.flights.iterations
+            best.nearly[places] |= found.nearly
+            better = np.flatnonzero(found.value < best.value[places])
+            _keep(best, places[better], found, better)
+        places = places[np.isinf(best.value[places])]
 
 
 def _follow(asked: _Asked, start: _Found, way: Way) -> _Found:
@@ -170,7 +187,8 @@ def _follow(asked: _Asked, start: _Found, way: Way) -> _Found:
         solved = np.flatnonzero(flights.status == CONVERGED)
         active, values = active[solved], values[solved]
         value = flights.level[solved] if asked.question.tau_free else values[:, _COST]
-        clear, kept = values[:, _CLEARANCE] >= 0.0, values[:, _VIOLATION] == 0.0
+        clear = values[:, _CLEARANCE] >= KEPT * asked.terrain.mean_edge_m
+        kept = values[:, _VIOLATION] == 0.0
         best.nearly[active] |= clear & ~kept & (values[:, _VIOLATION] < 1.0 - ARC_SHARES[-1])
         good = clear & (kept | asked.question.tau_free)
         better, before = good & (value < best.value[active]), best.value[active]
@@ -197,8 +215,8 @@ def _fly_between_walls(asked: _Asked, path: _Path, active: Ints, way: Way) -> tu
     values, places = np.full((len(active), len(VALUE_COLUMNS)), np.nan), active[solved]
     values[solved], path.handover[places] = _deliver(_part(asked, places), flights.thrust[solved])
     path.position[places] = flights.position[solved]
-    dips_m = np.maximum(-values[solved, _CLEARANCE], 0.0)
-    path.margin_m[places] += BOLDNESS * np.where(dips_m < SHALLOW * edge_m, dips_m, 0.0)
+    short_m = np.maximum(KEPT * edge_m - values[solved, _CLEARANCE], 0.0)
+    path.margin_m[places] += BOLDNESS * np.where(short_m < SHALLOW * edge_m, short_m, 0.0)
     lowest = np.sqrt(np.maximum(1.0 + values[solved, _ELLIPSOID], 0.0))
     path.level[places] += BOLDNESS * np.maximum(FLOOR - lowest, 0.0)
     return flights, values
@@ -222,7 +240,7 @@ def _deliver(asked: _Asked, thrust: Floats) -> tuple[Floats, Floats]:
 def _path(asked: _Asked, start: _Found) -> _Path:
     """Begin at given flights, with walls and tangent planes as low as they may be."""
     n, intervals = len(asked.facets), len(asked.question.case.mid_cos)
-    margin_m = np.full(n, MARGIN * asked.terrain.mean_edge_m)
+    margin_m = np.full(n, (1.0 + ROOM) * KEPT * asked.terrain.mean_edge_m)
     level = np.full(n, 1.0 + SAG / intervals**2)
     return _Path(start.flights.position.copy(), start.handover.copy(), margin_m, level)
 
@@ -246,14 +264,6 @@ def _rows(found: _Found, places: Ints) -> _Found:
     """Some rows of what was found."""
     flights = Batch(*(field[places] for field in found.flights))
     return _Found(flights, found.handover[places], found.value[places], found.nearly[places])
-
-
-def _improve(best: _Found, places: Ints, found: _Found) -> None:
-    """Take over what is better than the best so far."""
-    best.flights.iterations[places] += found.flights.iterations
-    best.nearly[places] |= found.nearly
-    better = np.flatnonzero(found.value < best.value[places])
-    _keep(best, places[better], found, better)
 
 
 def _keep(best: _Found, places: Ints, found: _Found, rows: Ints) -> None:

@@ -18,7 +18,7 @@ HERE = Path(__file__).resolve().parent
 INTERVALS = 40
 RADIUS_M = 25.0
 # where on the free flight the boulder stands (time over the time of flight), and how far beside it, m
-PLACES = ((0.80, 8.0), (0.84, -5.0), (0.88, 10.0), (0.72, 6.0), (0.62, -12.0), (0.76, 15.0))
+PLACES = ((0.80, 8.0), (0.84, -5.0), (0.72, 6.0), (0.76, 15.0))
 SITES = ((0.6, 0.3, 0.74), (0.9, -0.2, 0.35))
 STARTS = ("straight", "far", "left", "right")
 BASE = Problem(
