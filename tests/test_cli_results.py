@@ -270,3 +270,13 @@ def test_show_says_that_a_facet_is_unresolved(tmp_path: Path, capsys: pytest.Cap
     )
     told = "unresolved: no search converged, the best attempt breaks a limit by 0.25 of its scale"
     assert told_about(capsys, path, 1) == f"top_700s: facet 1 is {told}"
+
+
+def test_show_says_how_rock_stands_in_the_way(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    known: dict[str, list[float]] = {"violation": [0, 0.002, 0.031, 1], "binding": [0, 5, 5, 1]}
+    known["thrust_margin"] = [np.nan, np.nan, -0.031, np.nan]
+    path = stored_run(tmp_path / "a.h5", [YES, Verdict.UNRESOLVED, NO, NO], known=known)
+    told = "unresolved: no flight clear of rock was found, the best cuts 5 m into it"  # a0 tp^2 is 2500 m
+    assert told_about(capsys, path, 1) == f"top_700s: facet 1 is {told}"
+    told = "it needs 103.1 % of the thrust to pass clear of the rock, on the best way that was found"
+    assert told_about(capsys, path, 2) == f"top_700s: facet 2 is unreachable (not proved): {told}"

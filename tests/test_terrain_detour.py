@@ -133,7 +133,7 @@ def with_ball(mesh: Mesh, centre: np.ndarray, radius_m: float, subdivisions: int
 
 def read_boulders() -> list[tuple[dict[str, Any], float, float]]:
     """Inputs, least J without and with the boulder, of every row of boulder.csv."""
-    lines = (HERE / "boulder.csv").read_text().splitlines()
+    lines = (HERE / "terrain" / "boulder.csv").read_text().splitlines()
     headers = {h["case"]: h for h in (json.loads(line[2:]) for line in lines if line.startswith("# "))}
     rows = csv.DictReader(line for line in lines if not line.startswith("# "))
     return [(headers[r["case"]], float(r["j_free_m2_s3"]), float(r["j_m2_s3"])) for r in rows]

@@ -131,7 +131,8 @@ class Reach(Section):
         description="the final stage's thrust bound holds for: compensated (the real thrust) | paper (eq 14)",
     )
     terrain: Literal["report", "require"] = Field(
-        "report", description="whether a path that cuts the mesh is a landing: report | require (it is not)"
+        "report",
+        description="whether a path that cuts the mesh is a landing: report | require (another is looked for)",
     )
     method: Literal["traverse", "section"] = Field(
         "traverse", description="how the domain is found: traverse (every facet) | section (the paper's)"

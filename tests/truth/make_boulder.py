@@ -1,4 +1,4 @@
-"""Make boulder.csv: least J past a sphere that stands in the way of the best flight.
+"""Make terrain/boulder.csv: least J past a sphere that stands in the way of the best flight.
 
 Run from anywhere: ``nice python tests/truth/make_boulder.py``; see README.md beside it.
 """
@@ -92,7 +92,7 @@ def main() -> None:
             lines.append("# " + json.dumps({"case": name, **asdict(problem)}))
             rows.append([name, f"{free.j:.9g}", f"{half.j:.9g}", f"{best.j:.9g}", found.statuses])
             print(*rows[-1], f"{best.j / free.j - 1:.3%}", flush=True)
-    with (HERE / "boulder.csv").open("w", newline="") as file:
+    with (HERE / "terrain" / "boulder.csv").open("w", newline="") as file:
         file.write("\n".join(lines) + "\n")
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["case", "j_free_m2_s3", "j_half", "j_m2_s3", "j_starts"])
