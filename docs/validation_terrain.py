@@ -40,11 +40,11 @@ J, CLEARANCE = "performance_index_m2_s3", "terrain_clearance_min_m"
 SHRUNK, STEEP_DEG = 0.7, 85.0
 # scenario, what is changed, case, and every how many-th facet is asked
 ASKED = (
-    ("bacchus", "shrunk", "north_pole_900s", 8),
-    ("bacchus", "shrunk", "equator_1100s", 8),
-    ("bacchus", "shrunk", "mid_latitude_1600s", 8),
-    ("eros", "shrunk", "broadside_1500s", 20),
-    ("eros", "shrunk", "north_pole_2000s", 20),
+    ("bacchus", "shrunk", "north_pole_900s", 16),
+    ("bacchus", "shrunk", "equator_1100s", 16),
+    ("bacchus", "shrunk", "mid_latitude_1600s", 16),
+    ("eros", "shrunk", "broadside_1500s", 40),
+    ("eros", "shrunk", "north_pole_2000s", 40),
     ("bennu", "steep", "north_pole_900s", 1),
 )
 FLOWN_BY_TRIMESH = 5  # flights of each case
@@ -89,7 +89,8 @@ shipped scenarios have no such facet: outside the ellipsoid that holds the body 
 degrees keeps the final stage off it. So two of them are asked with an ellipsoid of {SHRUNK:g} times the semi-axes ("shrunk"; the
 ends of the body stand out of it), Bennu with a half-angle of {STEEP_DEG:g} degrees ("steep"). "Deepest" is the greatest depth in
 rock along flights flown again by the integrator of `landing results verify`; below 0 it is the least clearance beyond one mean
-edge from the touchdown.
+edge from the touchdown. J below 0 % more is a flight around rock that is cheaper than the one through it: the search
+without walls had led another way about the ellipsoid.
 
 {table(columns, rows)}
 

@@ -30,7 +30,7 @@ from landing_cli.reach.free_solve import Solver, cold_start, new_solver
 from landing_cli.reach.records import LandingCase
 
 
-def are_compiled(descent: str, terrain: str) -> bool:
+def are_compiled(descent: str, terrain: str = "report") -> bool:
     """Tell whether a case's kernels were compiled before, by this version for this kind of processor.
 
     Parameters

@@ -132,7 +132,7 @@ class Reach(Section):
     )
     terrain: Literal["report", "require"] = Field(
         "report",
-        description="whether a path that cuts the mesh is a landing: report | require (another is looked for)",
+        description="whether a path that cuts the mesh is a landing: report | require (another is sought)",
     )
     method: Literal["traverse", "section"] = Field(
         "traverse", description="how the domain is found: traverse (every facet) | section (the paper's)"
