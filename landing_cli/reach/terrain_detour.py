@@ -261,7 +261,7 @@ def _blank(asked: _Asked) -> _Found:
 
 def _rows(found: _Found, places: Ints) -> _Found:
     """Some rows of what was found."""
-    flights = Batch(*(field[places] for field in found.flights))
+    flights = Batch._make(field[places] for field in found.flights)
     return _Found(flights, found.handover[places], found.value[places], found.nearly[places])
 
 
