@@ -52,7 +52,7 @@ def dispersed_starts(bennu: ReachRun, images: Path, say: Callable[[str], None]) 
         )
         write_png(convergence_figure(result, telling_facets(result)), images / "validation-convergence.png")
     say("dispersions against the margin, and the full solve")
-    return f"""## How surely, from a start that is not known exactly
+    return f"""## 14. How surely, from a start that is not known exactly
 
 `reach disperse bennu.yaml --case {CASE} --samples {SAMPLES} --seed {result.drawing.seed}`, with the dispersions that the shipped scenario
 states. The control is optimised again for each sample: this is the probability that a site is reachable by a guidance

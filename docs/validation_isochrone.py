@@ -43,7 +43,7 @@ def isochrones(single: ReachRun, images: Path, say: Callable[[str], None]) -> st
         write_png(isochrone_figure(found.cases[0], surface), images / "bennu-isochrones.png")
         write_png(growth_figure(found.cases), images / "validation-isochrone-growth.png")
     grid = found.cases[0].grid
-    return f"""## When each facet is reachable
+    return f"""## 13. When each facet is reachable
 
 `reach isochrone bennu.yaml --tof-s 400:1200`: every facet is asked at {len(grid.tof_s)} times of flight from
 {grid.tof_s[0]:g} to {grid.tof_s[-1]:g} s; every change of verdict between two of them is halved until the two

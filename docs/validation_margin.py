@@ -67,7 +67,7 @@ def margins(say: Callable[[str], None] = lambda _: None) -> str:
     durations, gained = s["final_stage_s"], s["gained_by_free_stage"]
     before = int((freed.solutions.rows["compared_verdict"] == Verdict.REACHABLE).sum())
     lost, saved = _saving(freed)
-    return f"""## 11. How much thrust is to spare
+    return f"""## 12. How much thrust is to spare
 
 `reach.margin: true` asks every facet for tau, the least share of the thrust bound at which it is reached. What
 encloses it: from below a certificate (the ellipsoid left out), from above a flight that was integrated accurately and

@@ -51,7 +51,7 @@ def grids_and_sites(
         shared = next(iter(shared_cases(weaker, stronger)))
         figure = difference_figure(stronger, shared, map_surface(stronger.asteroid.mesh))
         plotting.write_png(figure, images / "results-diff.png")
-    return f"""## 11. Grids of domains, sites in order, runs side by side
+    return f"""## 15. Grids of domains, sites in order, runs side by side
 
 **`reach sweep bennu.yaml --over {" --over ".join(OVER)}`**: {swept.grid.question.cells} cells from {len(swept.grid.states)} initial
 states over {swept.grid.facets} facets. {_equal_to_run(swept, runs["bennu"])} {_exceptions(swept)}

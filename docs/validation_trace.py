@@ -96,7 +96,7 @@ def traces(runs: Runs, images: Path) -> str:
         "components missed, of 3 and more + smaller",
         "wrong, m²",
     )
-    return f"""## The boundary followed
+    return f"""## 11. The boundary followed
 
 `method: trace` asks an even covering of the surface, estimates the least thrust level of every other facet from the
 levels found, place and normal taken together, and asks where the estimate may be wrong about the side of 1; it ends

@@ -15,11 +15,11 @@ from landing_cli.reach.descent_model import (
     fill_arc_cones,
     fill_glide_cones,
     fill_handover_rows,
-    new_cuts,
 )
 from landing_cli.reach.free_descent import PreparedCase, prepare, solve_prepared, survey
 from landing_cli.reach.free_flights import Question, best_flights
 from landing_cli.reach.free_solve import CONVERGED
+from landing_cli.reach.planes import new_cuts
 from landing_cli.reach.records import Verdict
 from landing_cli.reach.scaled_case import scale_case
 from landing_cli.reach.shooting import fly_accurately

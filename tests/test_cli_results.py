@@ -307,3 +307,13 @@ def test_why_not_of_a_case_that_reaches_everything_is_an_empty_table(
     assert main("landing", command) == 0
     (header,) = capsys.readouterr().out.splitlines()
     assert header.startswith("facet,verdict,proved,binding,easiest,more_thrust_n,")
+
+
+def test_show_says_how_rock_stands_in_the_way(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    known: dict[str, list[float]] = {"violation": [0, 0.002, 0.031, 1], "binding": [0, 5, 5, 1]}
+    known["thrust_margin"] = [np.nan, np.nan, -0.031, np.nan]
+    path = stored_run(tmp_path / "a.h5", [YES, Verdict.UNRESOLVED, NO, NO], known=known)
+    told = "unresolved: no flight clear of rock was found, the best cuts 5 m into it"  # a0 tp^2 is 2500 m
+    assert told_about(capsys, path, 1).startswith(f"top_700s: facet 1 is {told}")
+    told = "it needs 103.1 % of the thrust to pass clear of the rock, on the best way that was found"
+    assert told_about(capsys, path, 2).startswith(f"top_700s: facet 2 is unreachable (not proved): {told}")

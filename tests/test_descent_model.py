@@ -14,22 +14,22 @@ from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.optimize.conic_records import Model, Point, new_model, new_point
 from landing_cli.reach.descent_model import (
-    Cuts,
     Layout,
-    arc_weights,
     fill_arc_cones,
     fill_glide_cones,
     fill_handover_rows,
     layout,
-    new_cuts,
     refresh,
 )
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
+from landing_cli.reach.planes import Cuts, arc_weights, new_cuts
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level, scale_case
 from landing_cli.reach.shooting import Path, new_path
 
 N = 10
 CUT_NODES = (4, 7, 10)
+WALLS = ((5, 0.0), (0, 0.6))  # at a node, and at a fraction of the final arc
+WALL_OFFSET = 0.3
 STRONG = asteroid(gravity=6.0, spin=4.0)
 
 
@@ -49,7 +49,7 @@ class Problem:
         self.target = self.target_m / self.scaled.length_m
         normal = self.target + 0.02 * rng.normal(size=3)
         self.normal = normal / np.linalg.norm(normal)
-        self.plan: Layout = layout(self.scaled, len(CUT_NODES), 0.7, True, 1.01)
+        self.plan: Layout = layout(self.scaled, len(CUT_NODES), 0.7, True, 1.01, len(WALLS))
         sizes = N, self.plan.n_cones, self.plan.n_rows
         self.point: Point = new_point(*sizes)
         self.model: Model = new_model(*sizes)
@@ -65,6 +65,9 @@ class Problem:
         for c in range(len(CUT_NODES)):
             self.cuts.node[c] = CUT_NODES[c]
             self.cuts.normal[c] = rng.normal(size=3)
+        for c, (node, fraction) in enumerate(WALLS, len(CUT_NODES)):
+            self.cuts.node[c], self.cuts.fraction[c] = node, fraction
+            self.cuts.normal[c], self.cuts.offset[c] = rng.normal(size=3), WALL_OFFSET
         fill_handover_rows(self.scaled, self.model)
         fill_arc_cones(self.scaled, self.model)
         fill_glide_cones(self.scaled, self.normal, self.model)
@@ -250,6 +253,21 @@ def test_planes_touch_the_ellipsoid_at_their_node_when_they_are_retaken() -> Non
         assert n @ (x / level) == pytest.approx(1.0, rel=1e-13)
 
 
+def test_a_wall_holds_at_its_node_or_at_its_point_of_the_final_arc() -> None:
+    p = Problem()
+    first = p.plan.n_equal + len(CUT_NODES)
+    T, e, s = p.scaled.final_time, p.point.y[1:4], p.point.y[4:7]
+    node, fraction = WALLS[0][0], WALLS[1][1]
+    togo = fraction * T
+    arc = p.target + togo**2 * (0.5 * e + (s - e) / (6.0 * T) * togo)  # s^2 (A + B s)
+    normals = p.cuts.normal[len(CUT_NODES) : len(CUT_NODES) + 2]
+    expected = np.array([normals[0] @ p.path.position[node], normals[1] @ arc]) - WALL_OFFSET
+    np.testing.assert_allclose(p.model.row_value[first : first + 2], expected, rtol=0, atol=1e-14)
+    p.refresh(retake=True)  # moves tangent planes only
+    np.testing.assert_array_equal(p.cuts.normal[len(CUT_NODES) : len(CUT_NODES) + 2], normals)
+    np.testing.assert_allclose(p.model.row_value[first : first + 2], expected, rtol=0, atol=1e-14)
+
+
 def lagrangian(p: Problem, thrust: np.ndarray, y: np.ndarray) -> float:
     """What the stationarity residual is the gradient of, nodes' own cones aside, from the values alone."""
     p.point.thrust[:], p.point.y[:] = thrust, y
@@ -326,6 +344,6 @@ def test_energy_is_that_of_the_two_stages() -> None:
 
 def test_layout_counts_the_rows_that_are_filled() -> None:
     p = Problem(handover="on_ellipsoid")
-    assert (p.plan.n_equal, p.plan.n_cuts, p.plan.n_rows) == (7, 3, 12)
+    assert (p.plan.n_equal, p.plan.n_cuts, p.plan.n_walls, p.plan.n_rows) == (7, 3, 2, 14)
     assert p.plan.n_cones == len(p.scaled.arc_fractions) + 2
-    assert p.model.row_end.tolist() == [N] * 6 + [0, *CUT_NODES, 0, N]
+    assert p.model.row_end.tolist() == [N] * 6 + [0, *CUT_NODES, 5, 0, 0, N]

@@ -236,33 +236,6 @@ def test_a_bound_on_the_propellant_is_kept_and_takes_facets_away() -> None:
     assert (tight.rows[J][pressed] > free.rows[J][pressed]).all()
 
 
-def mesa() -> Asteroid:
-    """The rock with its upper cap lifted straight up, so that a flat arc to its foot would cut the wall."""
-    mesh = rock()
-    vertices = mesh.vertices.copy()
-    up = np.array([0.1, 0.2, 1.0]) / np.linalg.norm([0.1, 0.2, 1.0])
-    vertices[vertices @ up > 0.6 * np.linalg.norm(vertices, axis=1)] *= 1.3
-    return asteroid(Mesh(vertices, mesh.faces))
-
-
-def test_terrain_that_is_required_refuses_exactly_the_paths_that_cut_rock() -> None:
-    flat = {
-        "glide_slope_half_angle_rad": np.radians(80.0),
-        "position_m": np.array([200.0, 200.0, 900.0]),
-        "tof_s": 800.0,
-    }
-    facets = np.arange(320)
-    report = solve_facets(landing_case(mesa(), **flat), facets)
-    require = solve_facets(landing_case(mesa(), terrain="require", **flat), facets)
-    good = reachable(report)
-    cut = good & (report.rows["terrain_clearance_min_m"] < 0.0)
-    assert cut.sum() >= 10
-    np.testing.assert_array_equal(reachable(require), good & ~cut)
-    assert (require.rows["binding"][cut] == Binding.TERRAIN).all()
-    assert (require.rows["violation"][cut] > 0.0).all()
-    assert (require.rows["proved"][cut] == 0).all()
-
-
 def test_a_facet_that_only_the_propellant_keeps_away_says_so() -> None:
     _, free = answered(tof_s=760.0)
     bound = float(np.quantile(free.rows["fuel_kg"][reachable(free)], 0.3))

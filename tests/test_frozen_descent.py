@@ -10,13 +10,15 @@ from landing_samples import landing_case
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.optimize.conic_records import Model, Point, new_model, new_point, new_step
-from landing_cli.reach.descent_model import Layout, layout, new_cuts, refresh
+from landing_cli.reach.descent_model import Layout, layout, refresh
 from landing_cli.reach.free_solve import Solver, cold_start
+from landing_cli.reach.planes import new_cuts
 from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal, scale_case
 from landing_cli.reach.shooting import new_path
 
 INTERVALS = 12
+WALL_AHEAD = 0.01
 
 
 def solver_of(scaled: ScaledCase, plan: Layout) -> Solver:
@@ -33,14 +35,18 @@ def solver_of(scaled: ScaledCase, plan: Layout) -> Solver:
 
 
 def frozen(
-    case: LandingCase, tau_free: bool, cut_nodes: tuple[int, ...] = (), level: float = 1.0
+    case: LandingCase,
+    tau_free: bool,
+    cut_nodes: tuple[int, ...] = (),
+    level: float = 1.0,
+    walls: tuple[tuple[int, float], ...] = (),
 ) -> tuple[Point, Model, Sizes]:
     """The problem of a facet half-way round, linearised at the cold start."""
     mesh = case.asteroid.mesh
     scaled = scale_case(case, INTERVALS)
     centroids, normals = facet_centroids(mesh), facet_normals(mesh)
     facet = int(np.argmin(np.abs(normals @ case.position_m / np.linalg.norm(case.position_m) + 0.3)))
-    plan = layout(scaled, len(cut_nodes), 1e-3 if tau_free else 1.0, tau_free, level)
+    plan = layout(scaled, len(cut_nodes), 1e-3 if tau_free else 1.0, tau_free, level, len(walls))
     solver = solver_of(scaled, plan)
     target = centroids[facet] / scaled.length_m
     if cut_nodes:
@@ -51,6 +57,13 @@ def frozen(
             solver.cuts.node[c] = k
             solver.cuts.normal[c] = ellipsoid_normal(scaled, scaled.node_cos[k], scaled.node_sin[k], *x)
     cold_start(scaled, target, normals[facet], plan, solver)
+    for c, (node, fraction) in enumerate(walls, len(cut_nodes)):
+        # a little to one side of where it would fly
+        x = solver.path.position[node] if node else target
+        aside = np.cross(normals[facet], x)
+        aside /= np.linalg.norm(aside)
+        solver.cuts.node[c], solver.cuts.fraction[c] = node, fraction
+        solver.cuts.normal[c], solver.cuts.offset[c] = aside, aside @ x + WALL_AHEAD
     refresh(scaled, target, plan, solver.cuts, False, solver.point, solver.path, solver.model)
     return (
         solver.point,
@@ -64,6 +77,8 @@ PROBLEMS = {
     "cuts": {"cut_nodes": (4, 5, 6, 7, 8, 9, 10), "level": 1.8},
     "paper's thrust": {"case": {"final_stage_thrust": "paper"}},
     "on the ellipsoid": {"case": {"handover": "on_ellipsoid"}},
+    "walls": {"walls": ((8, 0.0), (0, 1.0), (0, 0.7))},
+    "cuts and walls": {"cut_nodes": (6, 7, 8), "level": 1.8, "walls": ((0, 0.9), (10, 0.0))},
     "propellant": {"case": {"spacecraft": Spacecraft(2000.0, 20.0, 400.0, 1.9)}},
 }
 

@@ -76,12 +76,25 @@ def test_the_ellipsoid_holds_every_vertex_and_given_ones_are_kept(tmp_path: Path
     )
 
 
+def test_an_ellipsoid_may_leave_rock_outside_where_the_terrain_itself_is_in_the_way(tmp_path: Path) -> None:
+    smaller = built(tmp_path, "reach.ellipsoid_m=[300, 250, 190]", "reach.terrain=require").ellipsoid_m
+    np.testing.assert_array_equal(smaller, [300, 250, 190])
+
+
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
         (
             ["reach.ellipsoid_m=[300, 250, 190]"],
             "reach.ellipsoid_m: leaves 2 of the shape's 6 vertices outside",
+        ),
+        (
+            ["reach.ellipsoid_m=[300, 250, 190]", "reach.terrain=require", "reach.descent=extremal"],
+            "reach.ellipsoid_m: leaves 2 of the shape's 6 vertices outside",
+        ),
+        (
+            ["reach.ellipsoid_m=[300, 250, 100]", "reach.terrain=require"],
+            "reach.ellipsoid_m: is smaller than 0.7 of the least ellipsoid that holds the body",
         ),
         (["reach.initial_states.0.position_m=[0, 0, 200]"], "initial_states.0.position_m: top begins inside"),
         (["reach.initial_states.0.position_m=[0, 0, 0]"], "it is the centre"),

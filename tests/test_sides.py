@@ -15,13 +15,13 @@ from landing_cli.optimize.conic_records import new_model
 from landing_cli.reach import sides
 from landing_cli.reach.certificate import certified_thrust_level
 from landing_cli.reach.descent_model import (
-    Cuts,
     fill_arc_cones,
     fill_glide_cones,
     fill_handover_rows,
 )
 from landing_cli.reach.free_descent import PreparedCase, prepare, solve_prepared, survey
 from landing_cli.reach.margin import least_thrust_flights
+from landing_cli.reach.planes import Cuts
 from landing_cli.reach.records import Binding, Verdict
 from landing_cli.reach.scaled_case import ellipsoid_level, ellipsoid_normal
 
@@ -102,7 +102,7 @@ def test_no_multipliers_of_planes_prove_more_than_a_flight_that_keeps_to_them_ne
             angle = scaled.node_cos[k], scaled.node_sin[k]
             x = flights.position[f, k]
             normal[c] = np.array(ellipsoid_normal(scaled, *angle, *x)) / ellipsoid_level(scaled, *angle, *x)
-        cuts = Cuts(node.astype(np.int64), normal)
+        cuts = Cuts(node.astype(np.int64), normal, np.zeros(3), np.zeros(3))
         arc = p.shared.bounds.on_arcs_m_s2 / scaled.acceleration_m_s2
         target = p.shared.centroids_m[facet] / scaled.length_m
         for _ in range(200):

@@ -30,7 +30,8 @@ from landing_cli.body.gravity.bounds import largest_acceleration_outside
 from landing_cli.body.gravity.surface_bound import largest_acceleration_on_mesh
 from landing_cli.kernel import kernel
 from landing_cli.optimize.conic_records import Model, Point
-from landing_cli.reach.descent_model import Cuts, Layout
+from landing_cli.reach.descent_model import Layout
+from landing_cli.reach.planes import Cuts
 from landing_cli.reach.scaled_case import ScaledCase, gravity_on_arc
 
 Floats = NDArray[np.float64]

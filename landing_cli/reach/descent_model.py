@@ -10,8 +10,8 @@ so that at s = sigma T
     v       = -T [ (sigma - sigma^2 / 2) a_e + sigma^2 / 2 a_s ]        (rotating frame).
 
 Rows: position and velocity match at the handover (6); the handover on the ellipsoid, in that reading (1);
-tangent planes of the ellipsoid at chosen nodes, the handover reached from outside (in that reading) and the
-propellant bound (inequalities). Cones on y: the
+tangent planes of the ellipsoid at chosen nodes, planes off the terrain at nodes and points of the final arc,
+the handover reached from outside (in that reading) and the propellant bound (inequalities). Cones on y: the
 final stage's thrust at a few points of the arc, and the glide slope at both ends of the arc: r - r_c is
 s^2 times an affine function of s, so both ends inside the convex cone mean the whole arc inside.
 """
@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.kernel import kernel
-from landing_cli.kernel_record import by_reference
 from landing_cli.optimize.conic_ipm import fill_row_pull
 from landing_cli.optimize.conic_records import Model, Point
+from landing_cli.reach.planes import Cuts, arc_weights, refresh_planes
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal, gravity_on_arc
 from landing_cli.reach.shooting import Path, fly, pull_back
 
@@ -40,14 +40,6 @@ SMALL_THRUST = 1e-3
 COAST = 5e-3
 
 
-@by_reference
-class Cuts(NamedTuple):
-    """Tangent planes n . r >= level of the keep-out ellipsoid, each at one node."""
-
-    node: NDArray[np.int64]  # (C,)
-    normal: Floats  # (C, 3) solver axes
-
-
 class Layout(NamedTuple):
     """How many rows and cones a facet's problem has, and what it minimises."""
 
@@ -58,39 +50,19 @@ class Layout(NamedTuple):
     energy_weight: float  # weight rho of J in the objective
     tau_free: bool  # minimise tau + rho J instead of rho J at tau = 1
     level: float  # |xi| that the cuts keep (1 plus a margin for the path between nodes)
-
-
-def new_cuts(size: int) -> Cuts:
-    """Room for ``size`` cuts."""
-    return Cuts(np.zeros(size, dtype=np.int64), np.zeros((size, 3)))
+    n_walls: int  # planes off the terrain, after the cuts
 
 
 @kernel
-def layout(case: ScaledCase, n_cuts: int, energy_weight: float, tau_free: bool, level: float) -> Layout:
-    """Count rows and cones for a case with ``n_cuts`` tangent planes."""
+def layout(
+    case: ScaledCase, n_cuts: int, energy_weight: float, tau_free: bool, level: float, n_walls: int
+) -> Layout:
+    """Count rows and cones for a case with ``n_cuts`` tangent planes and ``n_walls`` off the terrain."""
     n_equal = 7 if case.on_ellipsoid else 6
-    n_rows = n_equal + n_cuts + (1 if case.on_ellipsoid else 0) + (1 if case.propellant < 1.0 else 0)
+    n_planes = n_cuts + n_walls
+    n_rows = n_equal + n_planes + (1 if case.on_ellipsoid else 0) + (1 if case.propellant < 1.0 else 0)
     n_cones = case.arc_fractions.shape[0] + 2
-    return Layout(n_equal, n_cuts, n_rows, n_cones, energy_weight, tau_free, level)
-
-
-@kernel
-def arc_weights(sigma: float, final_time: float) -> tuple[float, float, float, float, float, float]:
-    """Weights of (a_e, a_s) in a*, in r - r_c, and in v at time-to-go sigma T.
-
-    Returns
-    -------
-    a_e, a_s, r_e, r_s, v_e, v_s : float
-    """
-    T, s2 = final_time, sigma * sigma
-    return (
-        1.0 - sigma,
-        sigma,
-        T * T * s2 * (0.5 - sigma / 6.0),
-        T * T * s2 * sigma / 6.0,
-        -T * (sigma - 0.5 * s2),
-        -0.5 * T * s2,
-    )
+    return Layout(n_equal, n_cuts, n_rows, n_cones, energy_weight, tau_free, level, n_walls)
 
 
 @kernel
@@ -292,20 +264,6 @@ def _refresh_approach(case: ScaledCase, target: Floats, model: Model, y: Floats,
 
 
 @kernel
-def _refresh_cuts(case: ScaledCase, path: Path, model: Model, cuts: Cuts, plan: Layout, retake: bool) -> None:
-    """Rows of the tangent planes; ``retake`` moves each to the current position of its node."""
-    for c in range(plan.n_cuts):
-        k, n, r = cuts.node[c], cuts.normal[c], plan.n_equal + c
-        x = path.position[k]
-        if retake:
-            n[0], n[1], n[2] = ellipsoid_normal(case, case.node_cos[k], case.node_sin[k], x[0], x[1], x[2])
-        model.row_value[r] = n[0] * x[0] + n[1] * x[1] + n[2] * x[2] - plan.level
-        model.row_y[r, :] = 0.0
-        model.row_end[r] = k
-        pull_back(path, k, n[0], n[1], n[2], 0.0, 0.0, 0.0, model.row_thrust[r])
-
-
-@kernel
 def _refresh_propellant(
     case: ScaledCase, point: Point, path: Path, model: Model, r: int, touchdown_mass: float
 ) -> None:
@@ -409,8 +367,9 @@ def refresh(
         model.y_gradient[3 + i] = rho * weight * (2.0 * s + e)
     if case.on_ellipsoid:
         _refresh_handover_on_ellipsoid(case, target, model, point)
-        _refresh_approach(case, target, model, y, plan.n_equal + plan.n_cuts)
-    _refresh_cuts(case, path, model, cuts, plan, retake)
+        _refresh_approach(case, target, model, y, plan.n_equal + plan.n_cuts + plan.n_walls)
+    counts = plan.n_cuts, plan.n_walls
+    refresh_planes(case, target, path, model, cuts, plan.n_equal, counts, plan.level, retake, y)
     if case.propellant < 1.0:
         _refresh_propellant(case, point, path, model, plan.n_rows - 1, touchdown_mass)
     fill_row_pull(point, model, plan.n_rows)

@@ -23,6 +23,13 @@ _WORDS = {
 }
 
 
+_AROUND = {
+    Binding.ELLIPSOID: " to pass around the ellipsoid",
+    Binding.GLIDE_SLOPE: " to stay inside the glide slope",
+    Binding.TERRAIN: " to pass clear of the rock, on the best way that was found",
+}
+
+
 def tell_facet(result: CaseResult, facet: int) -> str:
     """Say in one sentence what is known about a facet, and why.
 
@@ -46,6 +53,8 @@ def tell_facet(result: CaseResult, facet: int) -> str:
         return f"{told} unreachable ({'proved' if row['proved'] else 'not proved'}): {_obstacle(result, row)}"
     if facet in result.lost:
         return f"{told} unresolved: it was lost, {result.lost[facet]}"
+    if Binding(int(row["binding"])) is Binding.TERRAIN:
+        return f"{told} unresolved: no flight clear of rock was found, the best cuts {_depth(result, row)}"
     if Binding(int(row["binding"])) is Binding.PROPELLANT:
         burnt = (result.case.spacecraft.propellant_kg or 0.0) * (1.0 + float(row["violation"]))
         return f"{told} unresolved: no flight within the propellant was found, the best burns {burnt:.4g} kg"
@@ -85,14 +94,13 @@ def _flight(row: Row) -> str:
 
 def _obstacle(result: CaseResult, row: Row) -> str:
     binding, violation = Binding(int(row["binding"])), float(row["violation"])
-    if binding is Binding.TERRAIN:
-        return "every flight that was found cuts rock on the way"
+    if binding is Binding.TERRAIN and result.case.descent == "extremal":
+        return "every extremal that was found cuts rock on the way"
     if result.case.descent == "extremal" and not row["proved"]:
         return f"no extremal meets every limit{_attempt(row)}; what stops it: {_WORDS[binding]}"
-    around = {
-        Binding.ELLIPSOID: " to pass around the ellipsoid",
-        Binding.GLIDE_SLOPE: " to stay inside the glide slope",
-    }.get(binding, "")
+    around = _AROUND.get(binding, "")
+    if binding is Binding.TERRAIN:  # the least thrust level of a facet knows nothing of rock
+        return f"it needs {_percent(1.0 + violation)} of the thrust{around}"
     if np.isfinite(row["thrust_margin"]):
         bound = row["thrust_level_bound"]
         certified = f" (certified: at least {_percent(bound)})" if bound > 1.0 else ""
@@ -102,6 +110,13 @@ def _obstacle(result: CaseResult, row: Row) -> str:
 
 def _percent(share: float) -> str:
     return f"{100.0 * share:.4g} %"
+
+
+def _depth(result: CaseResult, row: Row) -> str:
+    """How deep in rock the best flight is; the violation is in units of a0 tp^2."""
+    case = result.case
+    scale_m = case.spacecraft.thrust_max_n / case.spacecraft.mass_kg * case.descent_s**2
+    return f"{float(row['violation']) * scale_m:.3g} m into it"
 
 
 def _attempt(row: Row) -> str:

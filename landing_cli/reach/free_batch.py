@@ -27,6 +27,7 @@ THRUST = int(Binding.THRUST) - 1
 ELLIPSOID = int(Binding.ELLIPSOID) - 1
 GLIDE_SLOPE = int(Binding.GLIDE_SLOPE) - 1
 PROPELLANT = int(Binding.PROPELLANT) - 1
+TERRAIN = int(Binding.TERRAIN) - 1
 HANDOVER = int(Binding.HANDOVER) - 1
 
 
@@ -37,6 +38,17 @@ class CutBatch(NamedTuple):
     planes: Ints  # (n,) how many
     node: Ints  # (n, C)
     normal: Floats  # (n, C, 3) solver axes
+
+
+@by_reference
+class WallBatch(NamedTuple):
+    """Planes off the terrain for every facet of a batch (n facets, room for W planes each)."""
+
+    walls: Ints  # (n,) how many
+    node: Ints  # (n, W) of the descent, or 0: on the final arc
+    fraction: Floats  # (n, W) of the final arc's time-to-go
+    normal: Floats  # (n, W, 3) solver axes
+    offset: Floats  # (n, W)
 
 
 @by_reference
@@ -77,6 +89,12 @@ def no_cuts(size: int, intervals: int) -> CutBatch:
     )
 
 
+def no_walls(size: int) -> WallBatch:
+    """Return a batch without planes off the terrain, and without room for any."""
+    nodes, numbers = np.zeros((size, 0), dtype=np.int64), np.zeros((size, 0))
+    return WallBatch(np.zeros(size, dtype=np.int64), nodes, numbers, np.zeros((size, 0, 3)), numbers.copy())
+
+
 @kernel
 def keep_costates(case: ScaledCase, plan: Layout, solver: Solver, mass_costate: float, out: Floats) -> None:
     """Carry the multipliers back to the start and turn them into the rotating frame.
@@ -88,7 +106,9 @@ def keep_costates(case: ScaledCase, plan: Layout, solver: Solver, mass_costate: 
     n = path.gradient.shape[0]
     p = np.zeros(6)
     p[0], p[1], p[2], p[3], p[4], p[5] = pull_back(path, n, m[0], m[1], m[2], m[3], m[4], m[5], scratch)
-    for c in range(plan.n_cuts):
+    for c in range(plan.n_cuts + plan.n_walls):
+        if solver.cuts.node[c] == 0:  # on the final arc
+            continue
         eta, normal = m[plan.n_equal + c], solver.cuts.normal[c]
         t = pull_back(
             path,
@@ -125,6 +145,8 @@ def keep_pressure(case: ScaledCase, plan: Layout, solver: Solver, out: Floats) -
         out[GLIDE_SLOPE] += point.cone_dual[j, 0] * point.cone_slack[j, 0]
     for r in range(plan.n_equal, plan.n_equal + plan.n_cuts):
         out[ELLIPSOID] -= point.multiplier[r] * plan.level
+    for c in range(plan.n_cuts, plan.n_cuts + plan.n_walls):
+        out[TERRAIN] -= point.multiplier[plan.n_equal + c] * abs(solver.cuts.offset[c])
     if case.on_ellipsoid:
         out[HANDOVER] = abs(point.multiplier[6])
     if case.propellant < 1.0:
@@ -138,6 +160,7 @@ def solve_many(
     normals: Floats,
     cuts: CutBatch,
     keep_level: Floats,
+    walls: WallBatch,
     energy_weight: float,
     tau_free: bool,
     retake_from: int,
@@ -160,6 +183,8 @@ def solve_many(
         Tangent planes of the ellipsoid; on return at their last position.
     keep_level : (n,) float
         |xi| that the planes keep.
+    walls : WallBatch
+        Planes off the terrain; they stay where they are.
     energy_weight : float
         Weight of J in the objective.
     tau_free : bool
@@ -183,7 +208,13 @@ def solve_many(
             solver.cuts.node[c] = cuts.node[i, c]
             for a in range(3):
                 solver.cuts.normal[c, a] = cuts.normal[i, c, a]
-        plan = layout(case, count, energy_weight, tau_free, keep_level[i])
+        for w in range(walls.walls[i]):
+            c = count + w
+            solver.cuts.node[c], solver.cuts.fraction[c] = walls.node[i, w], walls.fraction[i, w]
+            solver.cuts.offset[c] = walls.offset[i, w]
+            for a in range(3):
+                solver.cuts.normal[c, a] = walls.normal[i, w, a]
+        plan = layout(case, count, energy_weight, tau_free, keep_level[i], walls.walls[i])
         outcome = solve(
             case, targets[i], normals[i], plan, retake_from, tube, arc_bound, limit, prove, solver
         )

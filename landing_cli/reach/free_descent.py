@@ -34,6 +34,7 @@ from landing_cli.reach.records import (
     take_rows,
 )
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
+from landing_cli.reach.terrain_detour import clear_flights
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -46,6 +47,7 @@ DOUBTFUL_LEVEL = 1.006
 
 _COST = "performance_index_m2_s3"
 _ENERGY, _VIOLATION = VALUE_COLUMNS.index(_COST), VALUE_COLUMNS.index("violation")
+_CLEARANCE = VALUE_COLUMNS.index("terrain_clearance_min_m")
 # Flights at full thrust in this share of the coarse intervals switch in between: they want the finer grid.
 SATURATED_SHARE, FULL_THRUST = 0.75, 0.999
 # Shares of the thrust bound that the final stage is given in turn where it exceeded the bound by less.
@@ -212,7 +214,9 @@ def _on_coarse_grid(prepared: PreparedCase, facets: Ints) -> Work:
     work = _new_work(prepared, prepared.coarse, prepared.coarse_tube, facets)
     _by_energy(prepared, work, np.arange(len(facets)))
     scarce = _within_propellant(prepared, work)
-    _by_margin(prepared, work, np.flatnonzero((work.rows["verdict"] == Verdict.UNRESOLVED) & ~scarce))
+    left_open = work.rows["verdict"] == Verdict.UNRESOLVED
+    _by_margin(prepared, work, np.flatnonzero(left_open & ~scarce & ~_through_rock(work.rows)))
+    _around_rock(prepared, work)
     return work
 
 
@@ -229,8 +233,37 @@ def _within_propellant(prepared: PreparedCase, work: Work) -> Flags:
         bound = prepared.frame.propellant_kg / prepared.frame.mass_kg
         bounded = work.question._replace(case=unbounded._replace(propellant=bound))
         _by_energy(prepared, work._replace(question=bounded), chosen)
-        rows["binding"][chosen[rows["verdict"][chosen] == Verdict.UNRESOLVED]] = Binding.PROPELLANT
+        still = (rows["verdict"] == Verdict.UNRESOLVED) & ~_through_rock(rows)
+        rows["binding"][chosen[still[chosen]]] = Binding.PROPELLANT
     return np.asarray(scarce)
+
+
+def _through_rock(rows: NDArray[np.void]) -> Flags:
+    """Rows whose best flight keeps every limit but clearance, where that is required."""
+    return np.asarray((rows["verdict"] == Verdict.UNRESOLVED) & (rows["binding"] == Binding.TERRAIN))
+
+
+def _around_rock(prepared: PreparedCase, work: Work) -> None:
+    """Look for another flight where the best one cuts rock.
+
+    Where none is found, the facet is unreachable if a way round is known that needs more than all thrust;
+    else it stays unresolved: a search that finds no way proves nothing.
+    """
+    rows = work.rows
+    chosen = np.flatnonzero(_through_rock(rows))
+    if len(chosen) == 0 or prepared.case.descent != "free":
+        return
+    bound = prepared.frame.propellant_kg / prepared.frame.mass_kg
+    question = _ask(work, chosen, False)
+    question = question._replace(case=question.case._replace(propellant=min(2.0, bound)))
+    found = clear_flights(prepared, question, rows["facet"][chosen].astype(np.int64))
+    rows["iterations"][chosen] += found.flights.iterations
+    _deliver(prepared, work, chosen, found.flights)
+    rows["thrust_margin"][chosen] = 1.0 - found.level
+    short = (rows["verdict"][chosen] == Verdict.UNRESOLVED) & (found.level > 1.0)
+    rows["verdict"][chosen[short]] = Verdict.UNREACHABLE
+    rows["binding"][chosen[short]] = Binding.TERRAIN
+    rows["violation"][chosen[short]] = found.level[short] - 1.0
 
 
 def _on_fine_grid(prepared: PreparedCase, facets: Ints) -> Work:
@@ -240,6 +273,7 @@ def _on_fine_grid(prepared: PreparedCase, facets: Ints) -> Work:
     _by_margin(prepared, work, everything)
     _by_energy(prepared, work, everything[work.rows["verdict"] != Verdict.UNREACHABLE])
     _within_propellant(prepared, work)
+    _around_rock(prepared, work)
     return work
 
 
@@ -260,10 +294,14 @@ def _deliver(prepared: PreparedCase, work: Work, chosen: Ints, flights: Batch) -
         prepared.shared.normals[facets],
         out,
     )
+    excess = out.values[:, _VIOLATION]
+    depth = np.maximum(-out.values[:, _CLEARANCE], 0.0) / scaled.length_m
+    cuts = (excess == 0.0) & (depth > 0.0) & (prepared.case.terrain == "require")
+    excess[cuts] = depth[cuts]
     # only a flight that keeps every limit, at less cost, takes the place of one that keeps them all
     better = (out.values[:, _VIOLATION] == 0.0) & (out.values[:, _ENERGY] < rows[_COST][chosen[found]])
     better |= rows["verdict"][chosen[found]] != Verdict.REACHABLE
-    found, out = found[better], Deliveries(out.values[better], out.handover[better])
+    found, cuts, out = found[better], cuts[better], Deliveries(out.values[better], out.handover[better])
     places = chosen[found]
     work.thrust[places] = flights.thrust[found]
     for column, name in enumerate(VALUE_COLUMNS):
@@ -275,12 +313,7 @@ def _deliver(prepared: PreparedCase, work: Work, chosen: Ints, flights: Batch) -
     rows["binding"][places] = _binding(flights.pressure[found], flights.energy[found])
     met = rows["violation"][places] == 0.0
     rows["verdict"][places[met]] = Verdict.REACHABLE
-    if prepared.case.terrain == "require":
-        depth = -rows["terrain_clearance_min_m"][places]
-        cuts = met & (depth > 0.0)
-        rows["verdict"][places[cuts]] = Verdict.UNREACHABLE
-        rows["binding"][places[cuts]] = Binding.TERRAIN
-        rows["violation"][places[cuts]] = depth[cuts] / scaled.length_m
+    rows["binding"][places[cuts]] = Binding.TERRAIN
 
 
 def _binding(pressure: Floats, energy: Floats) -> Ints:
@@ -313,8 +346,9 @@ def _solutions(prepared: PreparedCase, work: Work) -> FacetSolutions:
 def _doubtful(rows: NDArray[np.void]) -> Ints:
     """Rows that a finer time grid may decide otherwise."""
     near = (rows["verdict"] == Verdict.UNREACHABLE) & (rows["proved"] == 0)
-    near &= (rows["violation"] < DOUBTFUL_LEVEL - 1.0) & (rows["binding"] != Binding.TERRAIN)
+    near &= rows["violation"] < DOUBTFUL_LEVEL - 1.0
     open_ = (rows["verdict"] == Verdict.UNRESOLVED) & (rows["binding"] != Binding.PROPELLANT)
+    open_ &= ~_through_rock(rows)
     return np.flatnonzero(near | open_)
 
 

@@ -14,7 +14,7 @@ from landing_cli.reach.ellipsoid_arcs import (
     lowest_levels,
     lowest_levels_between,
 )
-from landing_cli.reach.free_batch import Batch, CutBatch, new_batch, no_cuts, solve_many
+from landing_cli.reach.free_batch import Batch, CutBatch, WallBatch, new_batch, no_cuts, no_walls, solve_many
 from landing_cli.reach.free_solve import CONVERGED, STALLED, new_solver
 from landing_cli.reach.scaled_case import ScaledCase
 
@@ -171,8 +171,40 @@ def _solve_again(
     return np.asarray(solved)
 
 
-def _solve(question: Question, cuts: CutBatch, level: Floats, retake_from: int, limit: int) -> Batch:
+def flights_between(question: Question, position: Floats, level: Floats, walls: WallBatch) -> Batch:
+    """Find the best flights between walls, in the neighbourhood of given paths about the ellipsoid.
+
+    Parameters
+    ----------
+    question : Question
+        Case, facets and objective.
+    position : (n, N + 1, 3) float
+        Nodes of the paths, solver axes: planes touch the ellipsoid below them.
+    level : (n,) float
+        |xi| that these planes keep.
+    walls : WallBatch
+        Planes off the terrain.
+
+    Returns
+    -------
+    flights : Batch
+        CONVERGED where a flight was found.
+    """
+    cuts = no_cuts(len(question.targets), len(question.case.mid_cos))
+    freeze_many(question.case, position, np.full(len(position), NEAR), cuts)
+    return _solve(question, cuts, level, NEVER, CUT_LIMIT, walls)
+
+
+def _solve(
+    question: Question,
+    cuts: CutBatch,
+    level: Floats,
+    retake_from: int,
+    limit: int,
+    walls: WallBatch | None = None,
+) -> Batch:
     """Run the kernel on a whole batch."""
+    walls = no_walls(len(question.targets)) if walls is None else walls
     out = new_batch(len(question.targets), len(question.case.mid_cos))
     solve_many(
         question.case,
@@ -180,6 +212,7 @@ def _solve(question: Question, cuts: CutBatch, level: Floats, retake_from: int, 
         question.normals,
         cuts,
         level,
+        walls,
         MARGIN_WEIGHT if question.tau_free else ENERGY_ONLY,
         question.tau_free,
         retake_from,
@@ -187,7 +220,7 @@ def _solve(question: Question, cuts: CutBatch, level: Floats, retake_from: int, 
         question.tube,
         question.arc_bound,
         False,
-        new_solver(question.case),
+        new_solver(question.case, walls.node.shape[1]),
         out,
     )
     return out

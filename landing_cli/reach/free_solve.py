@@ -18,15 +18,14 @@ from landing_cli.optimize.conic_ipm import advance, residuals
 from landing_cli.optimize.conic_records import Model, Point, Step, new_model, new_point, new_step
 from landing_cli.reach.certificate import certified_thrust_level, linearised_thrust_level
 from landing_cli.reach.descent_model import (
-    Cuts,
     Layout,
     fill_arc_cones,
     fill_glide_cones,
     fill_handover_rows,
-    new_cuts,
     refresh,
     refresh_arc,
 )
+from landing_cli.reach.planes import Cuts, new_cuts
 from landing_cli.reach.scaled_case import ScaledCase
 from landing_cli.reach.shooting import Path, fly, measure_defect, new_path
 
@@ -66,17 +65,17 @@ class Outcome(NamedTuple):
     mass_costate: float  # at the start
 
 
-def new_solver(case: ScaledCase) -> Solver:
-    """Allocate a solver for a scaled case."""
+def new_solver(case: ScaledCase, walls: int = 0) -> Solver:
+    """Allocate a solver for a scaled case, with room for so many walls off the terrain."""
     n = case.mid_cos.shape[0]
     n_cones = case.arc_fractions.shape[0] + 2
-    n_rows = 7 + (n + 1) + 2
+    n_rows = 7 + (n + 1) + walls + 2
     return Solver(
         new_point(n, n_cones, n_rows),
         new_model(n, n_cones, n_rows),
         new_step(n, n_cones, n_rows),
         new_path(n),
-        new_cuts(n + 1),
+        new_cuts(n + 1 + walls),
         np.zeros((n_cones, 4)),
     )
 

@@ -14,7 +14,9 @@ import numpy as np
 
 from landing_cli.body.adjacency import mean_edge_m
 from landing_cli.body.bvh import build_surface_index
+from landing_cli.body.clearance import signed_distances_into
 from landing_cli.body.mesh import facet_centroids, facet_normals
+from landing_cli.body.ray_cast import first_hits_into
 from landing_cli.compile_cache import is_cached
 from landing_cli.optimize.conic_ipm import advance, residuals
 from landing_cli.parallel.forks import share_out
@@ -28,15 +30,19 @@ from landing_cli.reach.free_solve import Solver, cold_start, new_solver
 from landing_cli.reach.records import LandingCase
 
 
-def are_compiled(descent: str) -> bool:
-    """Tell whether a descent's kernel was compiled before, by this version for this kind of processor.
+def are_compiled(descent: str, terrain: str = "report") -> bool:
+    """Tell whether a case's kernels were compiled before, by this version for this kind of processor.
 
     Parameters
     ----------
     descent : {"free", "extremal"}
         The family of trajectories.
+    terrain : {"report", "require"}
+        Whether a path that cuts the mesh is a landing.
     """
     kernels: list[Any] = [solve_many]
+    if terrain == "require":
+        kernels += [signed_distances_into, first_hits_into]
     if descent == "extremal":
         from landing_cli.reach.extremal_descent import search_batch
 
@@ -64,6 +70,8 @@ def compile_parts(case: LandingCase) -> None:
     parts = [_conic, lambda _: survey(case), _flight, _delivery, _certificates, _answers, _ellipsoid_arcs]
     if case.descent == "extremal":
         parts.insert(2, _extremals)
+    if case.terrain == "require":
+        parts.append(_terrain)
     with np.errstate(all="ignore"):
         share_out([_bound(part, prepared) for part in parts], len(os.sched_getaffinity(0)))
 
@@ -89,7 +97,7 @@ def _certificates(prepared: PreparedCase) -> None:
     """Bounds that prove a facet unreachable."""
     solver, case, target = _solver(prepared), prepared.coarse, prepared.shared.normals[0]
     point, model = solver.point, solver.model
-    linearised_thrust_level(case, layout(case, 0, 1.0, False, 1.0), point, model, solver.duals)
+    linearised_thrust_level(case, layout(case, 0, 1.0, False, 1.0, 0), point, model, solver.duals)
     multipliers = point.multiplier, point.cone_dual, solver.duals
     certified_thrust_level(case, target, prepared.coarse_tube, 1.0, model, *multipliers, solver.cuts, 0, 1.0)
 
@@ -97,7 +105,7 @@ def _certificates(prepared: PreparedCase) -> None:
 def _answers(prepared: PreparedCase) -> None:
     """What is kept of a solve's multipliers."""
     solver, case = _solver(prepared), prepared.coarse
-    plan = layout(case, 0, 1.0, False, 1.0)
+    plan = layout(case, 0, 1.0, False, 1.0, 0)
     keep_costates(case, plan, solver, 0.0, np.zeros(7))
     keep_pressure(case, plan, solver, np.zeros(6))
 
@@ -105,7 +113,7 @@ def _answers(prepared: PreparedCase) -> None:
 def _flight(prepared: PreparedCase) -> None:
     """The linearised flight, gravity and constraints."""
     case, solver, normal = prepared.coarse, _solver(prepared), prepared.shared.normals[0]
-    plan = layout(case, 0, 1.0, False, 1.0)
+    plan = layout(case, 0, 1.0, False, 1.0, 0)
     cold_start(case, normal, normal, plan, solver)
     refresh(case, normal, plan, solver.cuts, False, solver.point, solver.path, solver.model)
 
@@ -134,6 +142,13 @@ def _ellipsoid_arcs(prepared: PreparedCase) -> None:
     lowest_levels_between(case, np.zeros((1, n, 3)), out)
     arc_cuts_many(case, position, 1.0, cuts)
     freeze_many(case, position, out, cuts)
+
+
+def _terrain(prepared: PreparedCase) -> None:
+    """Distances and rays to the surface."""
+    surface, point = prepared.shared.surface, np.ones((1, 3))
+    signed_distances_into(surface, point, np.zeros(1), np.zeros(1, dtype=np.int64))
+    first_hits_into(surface, point, point, np.zeros(1), np.zeros(1, dtype=np.int64))
 
 
 def _extremals(prepared: PreparedCase) -> None:

@@ -166,7 +166,7 @@ def run(
         return Outcome(run_from_result(read(output)), up_to_date=True)
     with journal:
         cases = landing_cases(reach, built)
-        compiled = are_compiled(reach.descent)
+        compiled = are_compiled(reach.descent, reach.terrain)
         if not compiled:
             say(COMPILING)
             compile_parts(cases[0][1])

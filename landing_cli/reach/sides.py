@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.reach.certificate import gravity_tube
-from landing_cli.reach.free_batch import Batch, CutBatch, new_batch, solve_many
+from landing_cli.reach.free_batch import Batch, CutBatch, new_batch, no_walls, solve_many
 from landing_cli.reach.free_solve import CERTIFIED, new_solver
 from landing_cli.reach.records import Binding, FacetSolutions, Verdict
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
@@ -240,6 +240,7 @@ def _solve(relaxed: Relaxations, family: list[Branch]) -> Batch:
         relaxed.normals[places],
         _cuts(case, family),
         np.full(len(family), LEVEL),
+        no_walls(len(family)),
         MARGIN_WEIGHT,
         True,
         NEVER,

@@ -34,6 +34,8 @@ from landing_cli.scenario.schema_body import (
 from landing_cli.sources.shape_files import read_shape
 from landing_cli.sources.shape_search import find_shape
 
+# Of the semi-axes that hold the body: gravity models may have their masses not far inside.
+SMALLEST_SHARE = 0.7
 LIGHTEST_KG_M3, HEAVIEST_KG_M3 = 10.0, 20_000.0
 
 
@@ -252,19 +254,23 @@ def resolve_ellipsoid(reach: Reach, mesh: Mesh) -> FloatArray:
     Returns
     -------
     (3,) float, m
-        Semi-axes; every vertex lies inside.
+        Semi-axes; every vertex lies inside, unless flights must be clear of the terrain itself.
 
     Raises
     ------
     InputRefused
-        A given ellipsoid leaves vertices outside, or an initial state lies inside it.
+        A given ellipsoid leaves vertices outside where it may not, or an initial state lies inside it.
     """
     given = reach.ellipsoid_m
     if given == "auto":
         semi_axes = least_volume_ellipsoid(mesh.vertices)
     else:
         semi_axes = np.array(given)
-        _check_holds(semi_axes, mesh)
+        if reach.terrain == "require" and reach.descent == "free":
+            _check_not_small(semi_axes, mesh)
+            _check_states(reach, least_volume_ellipsoid(mesh.vertices))
+        else:
+            _check_holds(semi_axes, mesh)
     _check_states(reach, semi_axes)
     return semi_axes
 
@@ -325,6 +331,18 @@ def _check_holds(semi_axes: FloatArray, mesh: Mesh) -> None:
         raise KeyRefused(
             ("reach", "ellipsoid_m"),
             f"leaves {outside} of the shape's {len(levels)} vertices outside",
+            f"take auto, or at least [{enough}]",
+        )
+
+
+def _check_not_small(semi_axes: FloatArray, mesh: Mesh) -> None:
+    """Where the terrain keeps flights out of rock, the ellipsoid need not hold all of it."""
+    least = SMALLEST_SHARE * least_volume_ellipsoid(mesh.vertices)
+    if (semi_axes < least).any():
+        enough = ", ".join(f"{value:.6g}" for value in np.maximum(semi_axes, least * (1 + 1e-6)))
+        raise KeyRefused(
+            ("reach", "ellipsoid_m"),
+            f"is smaller than {SMALLEST_SHARE:g} of the least ellipsoid that holds the body",
             f"take auto, or at least [{enough}]",
         )
 

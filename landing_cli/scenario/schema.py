@@ -142,7 +142,8 @@ class Reach(Section):
         description="the final stage's thrust bound holds for: compensated (the real thrust) | paper (eq 14)",
     )
     terrain: Literal["report", "require"] = Field(
-        "report", description="whether a path that cuts the mesh is a landing: report | require (it is not)"
+        "report",
+        description="whether a path that cuts the mesh is a landing: report | require (another is sought)",
     )
     margin: bool = Field(
         False, description="whether every facet is asked for its least thrust level, and its boundary traced"

@@ -12,7 +12,6 @@ from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.errors import InputRefused
 from landing_cli.observe.features import (
     ThomasField,
-    closest_points,
     placed_landmarks,
     thomas_landmarks,
     thomas_points,
@@ -65,17 +64,6 @@ def test_a_field_that_leaves_the_body_is_refused():
         thomas_landmarks(mesh, build_surface_index(mesh), frame, DRAWN)
     with pytest.raises(InputRefused, match="draws no landmark"):
         thomas_landmarks(mesh, build_surface_index(mesh), frame, ThomasField(0, 1, 1e-9, 1.0, 1.0))
-
-
-def test_closest_points_are_those_of_trimesh():
-    import trimesh
-
-    rng = np.random.default_rng(6)
-    corners, points = rng.normal(size=(3000, 3, 3)), 2.0 * rng.normal(size=(3000, 3))
-    found = closest_points(corners, points)
-    expected = trimesh.triangles.closest_point(corners, points)
-    np.testing.assert_allclose(found, expected, atol=1e-12)
-    assert len({tuple(np.round(p, 9)) for p in found - points}) > 2900
 
 
 def test_listed_landmarks_are_put_on_the_mesh():

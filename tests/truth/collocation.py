@@ -11,10 +11,11 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from problem import Problem, descent_function, final_stage_function, symbols
+from problem import Problem, arc_positions, descent_function, final_stage_function, symbols
 
 CONVERGED = 2e-4  # relative change of tau or J by doubling the intervals
 DOUBLINGS = 3
+ARC_SAMPLES = 64  # of the final arc, kept out of a boulder
 RHO = 1e-5  # weight of J beside tau: picks one of many controls, and moves tau by less than RHO
 IPOPT = {
     "print_time": False,
@@ -48,7 +49,9 @@ class Local:
 
 
 @lru_cache(maxsize=8)
-def program(kind: str, n: int) -> tuple[ca.Function, dict[str, slice]]:
+def program(
+    kind: str, n: int, boulder: tuple[float, ...] | None = None
+) -> tuple[ca.Function, dict[str, slice]]:
     """The nonlinear program over n Hermite-Simpson intervals, and the rows of its constraints."""
     p, part = symbols()
     f, final = descent_function(kind), final_stage_function(kind)
@@ -67,12 +70,14 @@ def program(kind: str, n: int) -> tuple[ca.Function, dict[str, slice]]:
     thrust += [ca.dot(ratios[:, i], ratios[:, i]) - tau**2 for i in range(ratios.shape[1])]
     ellipsoid = [ca.sumsqr(X[:3, i] / part["semi_axes"]) - 1 for i in range(1, k)]
     j = j1 / (1 + part["t_final"]) + j2
+    arc = arc_positions(X[:, -1], part, ARC_SAMPLES)
     start = X[:, 0] - ca.vertcat(part["r0"], part["v0"], 1.0)
     blocks = {
         "dynamics": ca.vertcat(start, *defects),
         "thrust": ca.vertcat(*thrust),
         "ellipsoid": ca.vertcat(*ellipsoid),
         "cone": cone,
+        "boulder": _outside(boulder, [*(X[:3, i] for i in range(1, k)), *arc]),
         "arrival": -ca.dot(X[:3, -1] / part["semi_axes"] ** 2, X[3:6, -1]),
     }
     rows, at = {}, 0
@@ -89,13 +94,21 @@ def program(kind: str, n: int) -> tuple[ca.Function, dict[str, slice]]:
     return ca.nlpsol("hs", "ipopt", nlp, IPOPT), {"rows": rows, "count": at, "j": measure}
 
 
+def _outside(boulder: tuple[float, ...] | None, points: list[ca.SX]) -> ca.SX:
+    """Values that are not negative where points lie outside a sphere; none without one."""
+    if boulder is None:
+        return ca.SX(0, 1)
+    return ca.vertcat(*[ca.sumsqr(p - ca.DM(boulder[:3])) - boulder[3] ** 2 for p in points])
+
+
 def solve(problem: Problem, n: int, mode: str, x: np.ndarray, u: np.ndarray, tau: float) -> Local:
     """One local solve in mode ``tau`` or ``j`` from the given start."""
-    solver, info = program(problem.gravity[0], n)
+    solver, info = program(problem.gravity[0], n, problem.scaled_boulder)
     k, rows = 2 * n + 1, info["rows"]
     lower, upper = np.zeros(info["count"]), np.zeros(info["count"])
     lower[rows["thrust"]] = -np.inf
     upper[rows["ellipsoid"]] = upper[rows["cone"]] = upper[rows["arrival"]] = np.inf
+    upper[rows["boulder"]] = np.inf
     if problem.handover == "on_ellipsoid":  # reached from outside: between nodes the path could cheat
         upper[rows["ellipsoid"].stop - 1] = 0.0
     else:

@@ -48,6 +48,7 @@ class Problem:
     handover: str = "outside"
     final_thrust: str = "compensated"
     final_mass: str = "handover"  # mass of the final stage: that of the handover all along, or as "flown"
+    boulder: tuple[float, float, float, float] | None = None  # a sphere in the way: centre and radius, m
 
     def at(self, r_c: np.ndarray, normal: np.ndarray) -> Problem:
         """The same problem for another facet."""
@@ -56,6 +57,10 @@ class Problem:
     @property
     def length(self) -> float:
         return float(np.linalg.norm(self.r0))
+
+    @property
+    def scaled_boulder(self) -> tuple[float, ...] | None:
+        return None if self.boulder is None else tuple(b / self.length for b in self.boulder)
 
     @property
     def time(self) -> float:
@@ -130,6 +135,14 @@ def gravity_function(kind: str, gravity: Any) -> Any:
 def frame_acceleration(omega: Any, r: Any, v: Any) -> Any:
     """Coriolis and centrifugal terms 2 w x v + w x (w x r), spin about +z."""
     return ca.vertcat(-2 * omega * v[1] - omega**2 * r[0], 2 * omega * v[0] - omega**2 * r[1], 0.0)
+
+
+def arc_positions(x: Any, part: dict[str, Any], samples: int) -> list[Any]:
+    """Positions along the final arc from the handover state x, evenly spaced in time, scaled."""
+    T = part["t_final"]
+    d, v = x[:3] - part["r_c"], x[3:6]
+    A, B = 3 * d / T**2 + v / T, -2 * d / T**3 - v / T**2
+    return [part["r_c"] + s**2 * (A + B * s) for s in (T * i / samples for i in range(1, samples + 1))]
 
 
 def descent_function(kind: str) -> Any:

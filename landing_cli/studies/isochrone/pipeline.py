@@ -25,7 +25,7 @@ from landing_cli.results.store import read
 from landing_cli.scenario.build import Built, build
 from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.schema import Reach
-from landing_cli.scenario.sections import for_mission, isochrone_section, reach_section
+from landing_cli.scenario.sections import fixed_stage_reach, for_mission, isochrone_section, reach_section
 from landing_cli.scenario.show import to_yaml
 from landing_cli.studies.isochrone.intervals import facet_numbers, intervals_of
 from landing_cli.studies.isochrone.recorded import solve_recorded
