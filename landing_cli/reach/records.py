@@ -138,7 +138,12 @@ FACET_COLUMNS: tuple[Column, ...] = (
         "1",
         "1 - tau, tau the least share of the thrust bound at which free control reaches the facet",
     ),
-    Column("thrust_level_bound", "f8", "1", "certified lower bound on tau, ellipsoid left out"),
+    Column(
+        "thrust_level_bound",
+        "f8",
+        "1",
+        "certified lower bound on tau, ellipsoid left out; at least 1 where proved",
+    ),
     Column(
         "thrust_level_flown",
         "f8",
