@@ -26,7 +26,7 @@ run: $(RUN_STAMP) ## find the reachable domain of Bennu: a table, a figure and a
 	@echo "Result: $(RESULT); look further with: $(BIN)/landing results show $(RESULT)"
 
 test: $(DEV_STAMP) ## run the tests
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 check: lint types test ## lint, types and tests
 

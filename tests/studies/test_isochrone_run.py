@@ -5,6 +5,7 @@ from __future__ import annotations
 import types
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +55,7 @@ def made_up(monkeypatch: pytest.MonkeyPatch) -> None:
     solve_by(monkeypatch, made_up_samples)
     monkeypatch.setattr(pipeline, "are_compiled", lambda descent: True)
     monkeypatch.setattr(pipeline, "survey", lambda case: types.SimpleNamespace(centroids_m=np.zeros((8, 3))))
-    monkeypatch.setattr(facet_work, "CHUNK_FACETS", 16)
+    monkeypatch.setattr(pipeline, "in_chunks", partial(facet_work.in_chunks, size=16))
 
 
 @pytest.fixture(scope="module")
