@@ -99,6 +99,9 @@ def test_a_section_s_lists_stand_below_each_other(run: ReachRun) -> None:
     text = export_table(ReachRun((case,)), "boundary", "csv", CASE)
     parts = ["section,4", "section,5", "section,6", "ring,7", "boundary,1", "boundary,2", "domain,3"]
     assert text.splitlines() == ["part,facet", *parts]
+    with pytest.raises(InputRefused, match="pole_900s has other columns than that of pole_700s"):
+        other = dataclasses.replace(run.cases[0], boundary=run.cases[1].boundary)
+        export_table(ReachRun((case, other)), "boundary", "csv")
 
 
 def test_wrong_choices_are_refused_with_the_right_ones(run: ReachRun) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.errors import InputRefused
 from landing_cli.flight.trajectory import Trajectory
 from landing_cli.results.tree import COMPONENTS, Group
 
@@ -135,14 +136,23 @@ def stacked(tables: Mapping[str, Table]) -> Table:
     Parameters
     ----------
     tables : mapping of str to Table
-        By case; with the same columns.
+        By case.
 
     Returns
     -------
     Table
         With the case's name as first column.
+
+    Raises
+    ------
+    InputRefused
+        The tables have different columns: one case has a boundary of another kind than the next.
     """
     first = next(iter(tables.values()))
+    for name, table in tables.items():
+        if table.columns.keys() != first.columns.keys():
+            told = f"the table of {name} has other columns than that of {next(iter(tables))}"
+            raise InputRefused(told, fix="take one case with --case")
     names = np.concatenate([np.full(len(table), name) for name, table in tables.items()])
     columns = {"case": TableColumn(names)}
     for name, column in first.columns.items():
