@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from landing_cli.cli import console, guard
+from landing_cli.cli import console
+from landing_cli.cli.carry_out import carry_out, work_plan
 from landing_cli.cli.options import (
     Backend,
     BackendName,
@@ -88,15 +88,7 @@ def disperse(
 
     Writes runs/NAME-reach-disperse.h5 unless -o says otherwise. Sample K depends on the seed and K alone.
     """
-    from landing_cli.parallel.blas import pin_blas_threads
-    from landing_cli.parallel.plan import WorkPlan
-
-    plan = WorkPlan(
-        jobs=len(os.sched_getaffinity(0)) if jobs is None else jobs,
-        backend=backend.value,
-        scheduler=scheduler,
-    )
-    pin_blas_threads()
+    plan = work_plan(jobs, backend, scheduler)
     from landing_cli.scenario.load import load
 
     voice = console.Console(quiet)
@@ -114,15 +106,10 @@ def disperse(
     from landing_cli.studies.disperse.pipeline import RunOptions
     from landing_cli.studies.disperse.pipeline import run as run_dispersion
 
-    guard.hint_on_interrupt(f"finished solves are kept: continue with --resume (output {path})")
     options = RunOptions(plan=plan, resume=resume, force=force)
-    with voice.progress("solves") as progress:
-        outcome = run_dispersion(loaded, path, options, progress, voice.say)
-    guard.hint_on_interrupt("")
-    if outcome.up_to_date:
-        voice.say(f"{path} is up to date: same scenario, shape and version (--force solves again)")
-    else:
-        voice.say(f"wrote {path}")
+    outcome = carry_out(
+        lambda progress: run_dispersion(loaded, path, options, progress, voice.say), path, voice, "solves"
+    )
     print_run(outcome.run, path, as_json)
     _judge(outcome.run, path)
 

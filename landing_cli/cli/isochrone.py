@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from landing_cli.cli import console, guard
+from landing_cli.cli import console
+from landing_cli.cli.carry_out import carry_out, work_plan
 from landing_cli.cli.options import (
     Backend,
     BackendName,
@@ -80,15 +80,7 @@ def isochrone(
     isochrone.tolerance_s. Writes runs/NAME-reach-isochrone.h5 unless -o says otherwise. The domain at any
     time: landing results export RUN.h5 --table domain --tof-s T.
     """
-    from landing_cli.parallel.blas import pin_blas_threads
-    from landing_cli.parallel.plan import WorkPlan
-
-    plan = WorkPlan(
-        jobs=len(os.sched_getaffinity(0)) if jobs is None else jobs,
-        backend=backend.value,
-        scheduler=scheduler,
-    )
-    pin_blas_threads()
+    plan = work_plan(jobs, backend, scheduler)
     from landing_cli.scenario.load import load
 
     voice = console.Console(quiet)
@@ -101,15 +93,10 @@ def isochrone(
     from landing_cli.studies.isochrone.pipeline import RunOptions
     from landing_cli.studies.isochrone.pipeline import run as run_isochrone
 
-    guard.hint_on_interrupt(f"finished facets are kept: continue with --resume (output {path})")
     options = RunOptions(plan=plan, resume=resume, force=force)
-    with voice.progress("facets") as progress:
-        outcome = run_isochrone(loaded, path, options, progress, voice.say)
-    guard.hint_on_interrupt("")
-    if outcome.up_to_date:
-        voice.say(f"{path} is up to date: same scenario, shape and version (--force solves again)")
-    else:
-        voice.say(f"wrote {path}")
+    outcome = carry_out(
+        lambda progress: run_isochrone(loaded, path, options, progress, voice.say), path, voice, "facets"
+    )
     print_run(outcome.run, path, as_json)
     _judge(outcome.run, path)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Sequence
 from enum import StrEnum
@@ -11,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from landing_cli.cli import console, guard
+from landing_cli.cli import console
+from landing_cli.cli.carry_out import carry_out, work_plan
 from landing_cli.cli.options import (
     Backend,
     BackendName,
@@ -92,15 +92,7 @@ def observe(
     Bends the energy-optimal landing towards the landmarks by waypoints, or, with --objective information,
     finds the path that knows best where it is. Writes runs/NAME-plan-observe.h5 unless -o says otherwise.
     """
-    from landing_cli.parallel.blas import pin_blas_threads
-    from landing_cli.parallel.plan import WorkPlan
-
-    work = WorkPlan(
-        jobs=len(os.sched_getaffinity(0)) if jobs is None else jobs,
-        backend=backend.value,
-        scheduler=scheduler,
-    )
-    pin_blas_threads()
+    work = work_plan(jobs, backend, scheduler)
     voice = console.Console(quiet)
     request = _request(scenario, [*_replacements(objective, waypoints, site), *(overrides or ())], voice)
     path = output or Path("runs") / f"{request.loaded.scenario.name}-plan-observe.h5"
@@ -110,15 +102,10 @@ def observe(
     from landing_cli.observe.pipeline import RunOptions
     from landing_cli.observe.pipeline import run as run_observe
 
-    guard.hint_on_interrupt(f"finished observations are kept: continue with --resume (output {path})")
     options = RunOptions(plan=work, resume=resume, force=force)
-    with voice.progress("observations") as progress:
-        outcome = run_observe(request, path, options, progress, voice.say)
-    guard.hint_on_interrupt("")
-    if outcome.up_to_date:
-        voice.say(f"{path} is up to date: same scenario, shape and version (--force solves again)")
-    else:
-        voice.say(f"wrote {path}")
+    outcome = carry_out(
+        lambda progress: run_observe(request, path, options, progress, voice.say), path, voice, "observations"
+    )
     print_run(outcome.run, path, as_json)
     _judge(outcome, path, voice)
 

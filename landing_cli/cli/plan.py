@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from landing_cli.cli import console, guard
+from landing_cli.cli import console
+from landing_cli.cli.carry_out import carry_out, work_plan
 from landing_cli.cli.options import (
     Backend,
     BackendName,
@@ -269,15 +269,7 @@ def _carry_out(
     command: str, source: Source, way: _Way, tasks_of: Callable[[Request], Sequence[PlanTask]]
 ) -> None:
     """Read, build, solve, store, print, judge."""
-    from landing_cli.parallel.blas import pin_blas_threads
-    from landing_cli.parallel.plan import WorkPlan
-
-    work = WorkPlan(
-        jobs=len(os.sched_getaffinity(0)) if way.jobs is None else way.jobs,
-        backend=way.backend.value,
-        scheduler=way.scheduler,
-    )
-    pin_blas_threads()
+    work = work_plan(way.jobs, way.backend, way.scheduler)
     voice = console.Console(way.quiet)
     request = request_of_source(f"plan {command}", source, voice)
     tasks = tasks_of(request)
@@ -292,15 +284,10 @@ def _carry_out(
     from landing_cli.plan.pipeline import RunOptions
     from landing_cli.plan.pipeline import run as run_plans
 
-    guard.hint_on_interrupt(f"finished plans are kept: continue with --resume (output {path})")
     options = RunOptions(plan=work, resume=way.resume, force=way.force)
-    with voice.progress("plans") as progress:
-        outcome = run_plans(request, tasks, path, options, progress, voice.say)
-    guard.hint_on_interrupt("")
-    if outcome.up_to_date:
-        voice.say(f"{path} is up to date: same scenario, shape and version (--force solves again)")
-    else:
-        voice.say(f"wrote {path}")
+    outcome = carry_out(
+        lambda progress: run_plans(request, tasks, path, options, progress, voice.say), path, voice, "plans"
+    )
     print_run(outcome.run, path, way.as_json)
     _judge(outcome, path, voice)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from landing_cli.cli import console, guard
+from landing_cli.cli.carry_out import carry_out, work_plan
 from landing_cli.cli.options import (
     Backend,
     BackendName,
@@ -95,15 +95,7 @@ def run(
     Writes runs/NAME-reach-run.h5 unless -o says otherwise, and prints a table of the cases. The same
     scenario, shape and version again is up to date and not solved again.
     """
-    from landing_cli.parallel.blas import pin_blas_threads
-    from landing_cli.parallel.plan import WorkPlan
-
-    plan = WorkPlan(
-        jobs=len(os.sched_getaffinity(0)) if jobs is None else jobs,
-        backend=backend.value,
-        scheduler=scheduler,
-    )
-    pin_blas_threads()
+    plan = work_plan(jobs, backend, scheduler)
     from landing_cli.scenario.load import load
 
     voice = console.Console(quiet)
@@ -116,15 +108,10 @@ def run(
     from landing_cli.reach.pipeline import RunOptions
     from landing_cli.reach.pipeline import run as run_reach
 
-    guard.hint_on_interrupt(f"finished facets are kept: continue with --resume (output {path})")
     options = RunOptions(plan=plan, resume=resume, force=force, compare=compare)
-    with voice.progress("facets") as progress:
-        outcome = run_reach(loaded, path, options, progress, voice.say)
-    guard.hint_on_interrupt("")
-    if outcome.up_to_date:
-        voice.say(f"{path} is up to date: same scenario, shape and version (--force solves again)")
-    else:
-        voice.say(f"wrote {path}")
+    outcome = carry_out(
+        lambda progress: run_reach(loaded, path, options, progress, voice.say), path, voice, "facets"
+    )
     print_run(outcome.run, path, as_json)
     _judge(outcome.run, path)
 

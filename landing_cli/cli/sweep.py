@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from landing_cli.cli import console, guard
+from landing_cli.cli import console
+from landing_cli.cli.carry_out import carry_out, work_plan
 from landing_cli.cli.options import (
     Backend,
     BackendName,
@@ -70,15 +70,7 @@ def sweep(
     Several times of flight in the scenario are an axis too. Writes runs/NAME-reach-sweep.h5 unless -o says
     otherwise, and prints a table of the cells.
     """
-    from landing_cli.parallel.blas import pin_blas_threads
-    from landing_cli.parallel.plan import WorkPlan
-
-    plan = WorkPlan(
-        jobs=len(os.sched_getaffinity(0)) if jobs is None else jobs,
-        backend=backend.value,
-        scheduler=scheduler,
-    )
-    pin_blas_threads()
+    plan = work_plan(jobs, backend, scheduler)
     from landing_cli.studies.sweep.pipeline import RunOptions, grid_of
     from landing_cli.studies.sweep.pipeline import run as run_sweep
 
@@ -90,15 +82,14 @@ def sweep(
     if dry_run:
         _say_grid(grid, path, as_json)
         return
-    guard.hint_on_interrupt(f"finished facets are kept: continue with --resume (output {path})")
     options = RunOptions(plan=plan, resume=resume, force=force)
-    with voice.progress("facets") as progress:
-        outcome = run_sweep(grid, path, options, progress, voice.say)
-    guard.hint_on_interrupt("")
-    if outcome.up_to_date:
-        voice.say(f"{path} is up to date: same scenario, axes, shape and version (--force solves again)")
-    else:
-        voice.say(f"wrote {path}")
+    outcome = carry_out(
+        lambda progress: run_sweep(grid, path, options, progress, voice.say),
+        path,
+        voice,
+        "facets",
+        "scenario, axes, shape and version",
+    )
     print_run(outcome.run, path, as_json)
     _judge(outcome.run, path)
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from landing_cli.cli import console, guard
+from landing_cli.cli import console
+from landing_cli.cli.carry_out import carry_out, say_written, work_plan
 from landing_cli.cli.options import (
     Backend,
     BackendName,
@@ -50,6 +50,9 @@ PACKAGE = "landing_cli.tour"
 # what `landing results export` writes of a tour
 TABLES = ("summary", "flybys", "trajectory")
 HAS_FACETS = False
+
+# what decides whether a result is up to date
+_SAME = "scenario, catalogue and version"
 
 app = new_program("Which asteroids a spare spacecraft can fly by on its way.")
 
@@ -159,7 +162,7 @@ def escape(
         print_facts(facts, as_json)
         return
     outcome = run_escape(request, path, RunOptions(WorkPlan(), resume, force), voice.say)
-    _say_written(outcome, path, voice)
+    say_written(outcome, path, voice, _SAME)
     print_run(outcome.run, path, as_json)
 
 
@@ -274,15 +277,7 @@ def _carry_out(
 ) -> None:
     """Read, search, fly, store, print, judge."""
     jobs, backend, scheduler, resume, force = way
-    from landing_cli.parallel.blas import pin_blas_threads
-    from landing_cli.parallel.plan import WorkPlan
-
-    work = WorkPlan(
-        jobs=len(os.sched_getaffinity(0)) if jobs is None else jobs,
-        backend=backend.value,
-        scheduler=scheduler,
-    )
-    pin_blas_threads()
+    work = work_plan(jobs, backend, scheduler)
     from landing_cli.tour.cases import tour_case
     from landing_cli.tour.pipeline import Request, RunOptions, run_compare, run_search
 
@@ -297,14 +292,12 @@ def _carry_out(
     if dry_run:
         print_facts({"run": str(path), **case_facts(case)}, as_json)
         return
-    guard.hint_on_interrupt(f"finished flights are kept: continue with --resume (output {path})")
     options: RunOptions = RunOptions(work, resume, force)
     request = Request(f"tour {command}", loaded, case)
-    with voice.progress("flights") as progress:
-        run = run_search if command == "search" else run_compare
-        outcome = run(request, path, options, progress, voice.say)
-    guard.hint_on_interrupt("")
-    _say_written(outcome, path, voice)
+    run = run_search if command == "search" else run_compare
+    outcome = carry_out(
+        lambda progress: run(request, path, options, progress, voice.say), path, voice, "flights", _SAME
+    )
     print_run(outcome.run, path, as_json)
     _judge(outcome, path, voice)
 
@@ -318,13 +311,6 @@ def _say_catalogue(case: TourCase, voice: console.Console) -> None:
             f"{catalogue.source}: {len(catalogue.bad_rows)} bad rows left out, "
             f"the first in line {first.line}: {first.reason}"
         )
-
-
-def _say_written(outcome: Outcome, path: Path, voice: console.Console) -> None:
-    if outcome.up_to_date:
-        voice.say(f"{path} is up to date: same scenario, catalogue and version (--force solves again)")
-    else:
-        voice.say(f"wrote {path}")
 
 
 def _judge(outcome: Outcome, path: Path, voice: console.Console) -> None:
