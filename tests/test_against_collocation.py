@@ -35,6 +35,8 @@ TABLES = {
     "bennu_paper_thrust": Agreement(24),
     "bennu_paper": Agreement(24, p99=6e-3),
     "bacchus": Agreement(28),
+    # one facet, stopped by the ellipsoid, passes it on another side: its level is 0.081 too high; others 4e-4
+    "bacchus_boundary": Agreement(60, p99=1e-3, worst=2e-3, level=9e-2),
     # far beyond the boundary the least level found lies above the truth's; the verdict is the same
     "eros_flown_mass": Agreement(24, p99=6e-3, best=-1e-3, level=0.3),
     # keeps the handover's mass on the long final stage, which costs it up to 0.4 % of thrust, and 4 % of J

@@ -55,13 +55,12 @@ def bennu(name: str, r0: tuple[float, float, float], tof: float, **reading: str)
     return Case(f"{name}_{tof:.0f}s", problem, shape)
 
 
-def bacchus(tof: float) -> Case:
+def bacchus(tof: float, name: str = "north_pole", r0: tuple[float, float, float] = (0.0, 0.0, 600.0)) -> Case:
     shape = read_obj(SHAPES / "bacchus.obj")
     semi = tuple(np.ceil(least_ellipsoid(shape) * 1e3) / 1e3)
     omega, gravity = 2 * np.pi / (14.9 * 3600), ("dipole", 18.083, 0.437, 463.1)
-    r0 = (0.0, 0.0, 600.0)
     problem = Problem(r0, (0.0, 0.0, 0.0), omega, gravity, 2000.0, 20.0, 400.0, tof, 300.0, semi, np.pi / 3)
-    return Case(f"bacchus_north_pole_{tof:.0f}s", problem, shape)
+    return Case(f"bacchus_{name}_{tof:.0f}s", problem, shape)
 
 
 def eros(tof: float, **reading: str) -> Case:
@@ -152,6 +151,11 @@ def tables() -> dict[str, Callable[[], list[tuple[Case, Chooser]]]]:
         "bennu_paper_thrust": lambda: over_bennu(700.0, spread(5, 3), final_thrust="paper"),
         "bennu_paper": lambda: over_bennu(900.0, spread(5, 3), **paper),
         "bacchus": lambda: [(bacchus(900.0), near_boundary(12, 4)), (bacchus(1600.0), far_side(12))],
+        "bacchus_boundary": lambda: [
+            (bacchus(900.0), near_boundary(20, 0, survey=60)),
+            (bacchus(1000.0, "equator", (1000.0, 0.0, 0.0)), near_boundary(20, 0, survey=60)),
+            (bacchus(900.0, "mid_latitude", (400.0, 0.0, 600.0)), near_boundary(20, 0, survey=60)),
+        ],
         "eros": lambda: [(eros(2500.0), near_boundary(16, 8))],
         "eros_flown_mass": lambda: [(eros(2500.0, final_mass="flown"), near_boundary(16, 8))],
     }
