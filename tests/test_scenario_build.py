@@ -12,7 +12,7 @@ from landing_cli.body.gravity.dipole import dipole_field
 from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.mass_properties import mass_properties
 from landing_cli.errors import InputRefused
-from landing_cli.scenario.build import Built, build
+from landing_cli.scenario.build import Built, build, builder_over, read_surface
 from landing_cli.scenario.init import scenario_text
 from landing_cli.scenario.load import load
 
@@ -159,3 +159,13 @@ def test_a_first_scenario_of_any_body_builds(shape: str, tmp_path: Path) -> None
     assert len(loaded.scenario.reach.cases()) == 6
     weight = result.asteroid.gm_m3_s2 / result.ellipsoid_m.min() ** 2
     assert result.spacecraft.thrust_max_n / result.spacecraft.mass_kg >= 10 * weight
+
+
+def test_an_ellipsoid_is_held_to_the_terrain_of_each_scenario_over_one_surface(tmp_path: Path) -> None:
+    """What one scenario may ask for, as it requires clear flights, another over the same surface may not."""
+    path = write_minimal(tmp_path)
+    smaller = ["reach.ellipsoid_m=[300, 250, 190]", "reach.terrain=require"]
+    build_one = builder_over(read_surface(load(str(path), smaller)))
+    build_one(load(str(path), smaller))
+    with pytest.raises(InputRefused, match=r"reach\.ellipsoid_m: leaves 2 of the shape"):
+        build_one(load(str(path), smaller[:1]))

@@ -158,7 +158,10 @@ def builder_over(surface: Surface) -> Callable[[LoadedScenario], Built]:
 
 def _of_ellipsoid(reach: Reach | None) -> object:
     """What the keep-out ellipsoid and its checks depend on beside the mesh."""
-    return reach and (reach.ellipsoid_m, tuple(state.start_m for state in reach.initial_states))
+    if reach is None:
+        return None
+    starts = tuple(state.start_m for state in reach.initial_states)
+    return reach.ellipsoid_m, starts, reach.terrain, reach.descent
 
 
 def _refused(error: KeyRefused, loaded: LoadedScenario) -> InputRefused:
