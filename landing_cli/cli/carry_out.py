@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from landing_cli.cli import console, guard
 from landing_cli.cli.options import Backend
+from landing_cli.errors import NothingFeasible, PartialResult
 
 if TYPE_CHECKING:
     from landing_cli.parallel.plan import WorkPlan
@@ -111,3 +112,33 @@ def say_written(outcome: Outcome, path: Path, voice: console.Console, same: str)
         voice.say(f"{path} is up to date: same {same} (--force solves again)")
     else:
         voice.say(f"wrote {path}")
+
+
+def judge_domain(lost: int, unit: str, reachable: bool, path: Path, nothing: str, fix: str) -> None:
+    """Turn what was found of a reachable domain into the exit code.
+
+    Parameters
+    ----------
+    lost : int
+        How many answers were lost to failures.
+    unit : str
+        What they are, in the plural.
+    reachable : bool
+        Whether any facet is.
+    path : Path
+        Where the result is.
+    nothing, fix : str
+        What to say, and to advise, where none is.
+
+    Raises
+    ------
+    PartialResult
+        If some were lost.
+    NothingFeasible
+        If no facet is reachable.
+    """
+    if lost:
+        told = f"{lost} {unit} were lost to failures and stand as unresolved"
+        raise PartialResult(told, where=str(path), fix="--resume tries them again")
+    if not reachable:
+        raise NothingFeasible(nothing, where=str(path), fix=fix)

@@ -7,7 +7,7 @@ import math
 import sys
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
@@ -288,3 +288,40 @@ def _duration(seconds: float) -> str:
     if hours:
         return f"{hours} h {minutes:02d} min"
     return f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
+
+
+def print_told(
+    told: Mapping[str, str],
+    known: Sequence[Mapping[str, Any]],
+    rows: Sequence[Sequence[Any]],
+    facet: int,
+    path: Path,
+    as_json: bool,
+) -> None:
+    """Print what is known about one facet: a sentence a case and a table, or JSON.
+
+    Parameters
+    ----------
+    told : mapping of str to str
+        The sentence of each case.
+    known : sequence of mapping
+        What JSON tells of each case.
+    rows : sequence of sequences
+        Of the table: a quantity, and its value in each case.
+    facet : int
+        0-based.
+    path : Path
+        The result's file.
+    as_json : bool
+        Print JSON.
+    """
+    if as_json:
+        cases = [
+            {"case": name, "told": sentence, **values}
+            for (name, sentence), values in zip(told.items(), known, strict=True)
+        ]
+        print_json({"run": str(path), "facet": facet, "cases": cases})
+        return
+    for name, sentence in told.items():
+        print_text(f"{name}: {sentence}")
+    print_table(["quantity", *told], rows)

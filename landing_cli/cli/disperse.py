@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from landing_cli.cli import console
-from landing_cli.cli.carry_out import carry_out, work_plan
+from landing_cli.cli.carry_out import carry_out, judge_domain, work_plan
 from landing_cli.cli.options import (
     Backend,
     BackendName,
@@ -24,7 +24,6 @@ from landing_cli.cli.options import (
     Scheduler,
     StartOver,
 )
-from landing_cli.errors import NothingFeasible, PartialResult
 
 if TYPE_CHECKING:
     from landing_cli.studies.disperse.records import CaseDispersion, DispersionRun
@@ -111,7 +110,14 @@ def disperse(
         lambda progress: run_dispersion(loaded, path, options, progress, voice.say), path, voice, "solves"
     )
     print_run(outcome.run, path, as_json)
-    _judge(outcome.run, path)
+    judge_domain(
+        outcome.run.lost_solves,
+        "solves",
+        any(result.summary["reachable_mean"] for result in outcome.run.cases),
+        path,
+        "no facet is reachable in any sample of any case",
+        "lengthen reach.tof_s, or raise spacecraft.thrust_max_n",
+    )
 
 
 def print_run(run: DispersionRun, path: Path, as_json: bool) -> None:
@@ -176,22 +182,13 @@ def print_facet(cases: Sequence[CaseDispersion], facet: int, path: Path, as_json
 
     told = {result.case.name: tell_facet(result, facet) for result in cases}
     facts = [facet_facts(result, facet) for result in cases]
-    if as_json:
-        known = [
-            {"case": name, "told": sentence, **values}
-            for (name, sentence), values in zip(told.items(), facts, strict=True)
-        ]
-        console.print_json({"run": str(path), "facet": facet, "cases": known})
-        return
-    for name, sentence in told.items():
-        console.print_text(f"{name}: {sentence}")
     shown = [key for key in facts[0] if key not in ("facet", "correlation")]
     rows = [[key, *(values[key] for values in facts)] for key in shown]
     rows += [
         [f"correlation_{key}", *(values["correlation"][key] for values in facts)]
         for key in facts[0]["correlation"]
     ]
-    console.print_table(["quantity", *told], rows)
+    console.print_told(told, facts, rows, facet, path, as_json)
 
 
 def print_verification(reports: Sequence[DispersionReport], path: Path, as_json: bool) -> None:
@@ -253,19 +250,3 @@ def _say_plan(request: Request, path: Path, as_json: bool) -> None:
         console.print_json({"run": str(path), "scenario": request.loaded.scenario.name, "cases": cases})
     else:
         console.print_table(list(cases[0]), [list(case.values()) for case in cases])
-
-
-def _judge(run: DispersionRun, path: Path) -> None:
-    """Turn what the run found into its exit code."""
-    if run.lost_solves:
-        raise PartialResult(
-            f"{run.lost_solves} solves were lost to failures and stand as unresolved",
-            where=str(path),
-            fix="--resume tries them again",
-        )
-    if not any(result.summary["reachable_mean"] for result in run.cases):
-        raise NothingFeasible(
-            "no facet is reachable in any sample of any case",
-            where=str(path),
-            fix="lengthen reach.tof_s, or raise spacecraft.thrust_max_n",
-        )

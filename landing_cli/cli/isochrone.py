@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from landing_cli.cli import console
-from landing_cli.cli.carry_out import carry_out, work_plan
+from landing_cli.cli.carry_out import carry_out, judge_domain, work_plan
 from landing_cli.cli.options import (
     Backend,
     BackendName,
@@ -25,7 +25,7 @@ from landing_cli.cli.options import (
     Scheduler,
     StartOver,
 )
-from landing_cli.errors import NothingFeasible, PartialResult, UsageError
+from landing_cli.errors import UsageError
 
 if TYPE_CHECKING:
     from landing_cli.scenario.load import LoadedScenario
@@ -98,7 +98,14 @@ def isochrone(
         lambda progress: run_isochrone(loaded, path, options, progress, voice.say), path, voice, "facets"
     )
     print_run(outcome.run, path, as_json)
-    _judge(outcome.run, path)
+    judge_domain(
+        outcome.run.lost_items,
+        "questions",
+        any(result.summary["reachable"] for result in outcome.run.cases),
+        path,
+        "no facet is reachable at any of these times",
+        "lengthen isochrone.tof_max_s (or --tof-s), or raise spacecraft.thrust_max_n",
+    )
 
 
 def print_run(run: IsochroneRun, path: Path, as_json: bool) -> None:
@@ -161,17 +168,9 @@ def print_facet(cases: Sequence[StateResult], facet: int, path: Path, as_json: b
 
     told = {result.case.name: tell_facet(result, facet) for result in cases}
     facts = [facet_facts(result, facet) for result in cases]
-    if as_json:
-        known = [
-            {"case": name, "told": sentence, **values}
-            for (name, sentence), values in zip(told.items(), facts, strict=True)
-        ]
-        console.print_json({"run": str(path), "facet": facet, "cases": known})
-        return
-    for name, sentence in told.items():
-        console.print_text(f"{name}: {sentence}")
     shown = [key for key in facts[0] if key not in ("facet", "interval_list")]
-    console.print_table(["quantity", *told], [[key, *(values[key] for values in facts)] for key in shown])
+    rows = [[key, *(values[key] for values in facts)] for key in shown]
+    console.print_told(told, facts, rows, facet, path, as_json)
 
 
 def print_verification(reports: Sequence[IsochroneReport], path: Path, as_json: bool) -> None:
@@ -251,19 +250,3 @@ def _say_plan(loaded: LoadedScenario, path: Path, as_json: bool) -> None:
         console.print_json({"run": str(path), "scenario": loaded.scenario.name, "cases": rows})
     else:
         console.print_table(list(rows[0]), [list(row.values()) for row in rows])
-
-
-def _judge(run: IsochroneRun, path: Path) -> None:
-    """Turn what the study found into its exit code."""
-    if run.lost_items:
-        raise PartialResult(
-            f"{run.lost_items} questions were lost to failures and stand as unresolved",
-            where=str(path),
-            fix="--resume tries them again",
-        )
-    if not any(result.summary["reachable"] for result in run.cases):
-        raise NothingFeasible(
-            "no facet is reachable at any of these times",
-            where=str(path),
-            fix="lengthen isochrone.tof_max_s (or --tof-s), or raise spacecraft.thrust_max_n",
-        )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from landing_cli.cli import console, guard
-from landing_cli.cli.carry_out import carry_out, work_plan
+from landing_cli.cli.carry_out import carry_out, judge_domain, work_plan
 from landing_cli.cli.options import (
     Backend,
     BackendName,
@@ -25,7 +25,6 @@ from landing_cli.cli.options import (
     StartOver,
     new_program,
 )
-from landing_cli.errors import NothingFeasible, PartialResult
 
 if TYPE_CHECKING:
     from landing_cli.reach.stored import CaseResult, ReachRun
@@ -113,7 +112,14 @@ def run(
         lambda progress: run_reach(loaded, path, options, progress, voice.say), path, voice, "facets"
     )
     print_run(outcome.run, path, as_json)
-    _judge(outcome.run, path)
+    judge_domain(
+        outcome.run.lost_facets,
+        "facets",
+        any(result.summary["reachable"] for result in outcome.run.cases),
+        path,
+        "no facet is reachable in any case",
+        "lengthen reach.tof_s, or raise spacecraft.thrust_max_n",
+    )
 
 
 def print_run(run: ReachRun, path: Path, as_json: bool) -> None:
@@ -210,22 +216,17 @@ def print_facet(cases: Sequence[CaseResult], facet: int, path: Path, as_json: bo
     for result, why in zip(cases, reasons, strict=True):
         if why is not None:
             told[result.case.name] += f"; {tell_relaxations(result.case, why)}"
-    if as_json:
-        known = [
-            {"case": name, "told": sentence, **values, "why_not": why and relaxation_facts(why)}
-            for (name, sentence), values, why in zip(told.items(), facts, reasons, strict=True)
-        ]
-        console.print_json({"run": str(path), "facet": facet, "cases": known})
-        return
-    for name, sentence in told.items():
-        console.print_text(f"{name}: {sentence}")
+    known = [
+        {**values, "why_not": why and relaxation_facts(why)}
+        for values, why in zip(facts, reasons, strict=True)
+    ]
     shown = [
         key
         for key, value in facts[0].items()
         if key != "facet" and not (isinstance(value, list) and facts[1:])
     ]
     rows = [[key, *(_short(values[key]) for values in facts)] for key in shown]
-    console.print_table(["quantity", *told], rows)
+    console.print_told(told, known, rows, facet, path, as_json)
 
 
 def print_verification(reports: Sequence[CaseReport], path: Path, as_json: bool) -> None:
@@ -288,19 +289,3 @@ def _say_plan(loaded: LoadedScenario, path: Path, as_json: bool) -> None:
         console.print_json({"run": str(path), "scenario": loaded.scenario.name, "cases": cases})
     else:
         console.print_table(list(cases[0]), [list(case.values()) for case in cases])
-
-
-def _judge(run: ReachRun, path: Path) -> None:
-    """Turn what the run found into its exit code."""
-    if run.lost_facets:
-        raise PartialResult(
-            f"{run.lost_facets} facets were lost to failures and stand as unresolved",
-            where=str(path),
-            fix="--resume tries them again",
-        )
-    if not any(result.summary["reachable"] for result in run.cases):
-        raise NothingFeasible(
-            "no facet is reachable in any case",
-            where=str(path),
-            fix="lengthen reach.tof_s, or raise spacecraft.thrust_max_n",
-        )

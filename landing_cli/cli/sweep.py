@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from landing_cli.cli import console
-from landing_cli.cli.carry_out import carry_out, work_plan
+from landing_cli.cli.carry_out import carry_out, judge_domain, work_plan
 from landing_cli.cli.options import (
     Backend,
     BackendName,
@@ -24,7 +24,6 @@ from landing_cli.cli.options import (
     Scheduler,
     StartOver,
 )
-from landing_cli.errors import NothingFeasible, PartialResult
 
 if TYPE_CHECKING:
     from landing_cli.reach.verify import CaseReport
@@ -91,7 +90,14 @@ def sweep(
         "scenario, axes, shape and version",
     )
     print_run(outcome.run, path, as_json)
-    _judge(outcome.run, path)
+    judge_domain(
+        outcome.run.lost_facets,
+        "facets",
+        any(case.summary["reachable"] for case in outcome.run.cases),
+        path,
+        "no facet is reachable in any cell",
+        "sweep longer times of flight, or stronger thrust",
+    )
 
 
 def print_run(run: SweepRun, path: Path, as_json: bool) -> None:
@@ -235,19 +241,3 @@ def _say_grid(grid: Grid, path: Path, as_json: bool) -> None:
 
 def _values(texts: Sequence[str]) -> str:
     return ", ".join(texts if len(texts) <= 12 else [*texts[:6], "...", *texts[-3:]])
-
-
-def _judge(run: SweepRun, path: Path) -> None:
-    """Turn what the sweep found into its exit code."""
-    if run.lost_facets:
-        raise PartialResult(
-            f"{run.lost_facets} facets were lost to failures and stand as unresolved",
-            where=str(path),
-            fix="--resume tries them again",
-        )
-    if not any(case.summary["reachable"] for case in run.cases):
-        raise NothingFeasible(
-            "no facet is reachable in any cell",
-            where=str(path),
-            fix="sweep longer times of flight, or stronger thrust",
-        )

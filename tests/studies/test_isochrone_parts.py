@@ -99,7 +99,7 @@ def asked(grid: TimeGrid, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
     shared: Any = types.SimpleNamespace(centroids_m=np.zeros((len(truth), 3)))
     study = Study((CASE,), grid, shared)
 
-    def solve(own: Study, items: np.ndarray) -> np.ndarray:
+    def solve(own: Study, items: np.ndarray, prove: bool = True) -> np.ndarray:
         rows = np.zeros(len(items), dtype=SAMPLE_DTYPE)
         rows["item"] = np.sort(items)
         _, place, facet = own.parted(rows["item"])

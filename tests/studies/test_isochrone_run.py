@@ -113,7 +113,7 @@ def interrupted_after(chunks: int) -> Callable[..., Any]:
     """Stand for the solver, and stop the run once so many chunks are solved."""
     solved = 0
 
-    def solve(*given: Any) -> Any:
+    def solve(*given: Any, prove: bool = True) -> Any:
         nonlocal solved
         if solved == chunks:
             raise KeyboardInterrupt
@@ -138,7 +138,7 @@ def test_an_interrupted_run_resumes_to_the_same_file_and_solves_no_chunk_twice(
         study(tmp_path)
     asked: list[int] = []
 
-    def counted(own: Any, items: np.ndarray) -> Any:
+    def counted(own: Any, items: np.ndarray, prove: bool = True) -> Any:
         asked.extend(items.tolist())
         return made_up_samples(own, items)
 
@@ -189,7 +189,7 @@ def test_a_lost_question_stands_as_unresolved_and_is_asked_again(
 
 @pytest.mark.usefixtures("made_up")
 def test_a_journal_of_other_questions_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def other_items(own: Any, items: np.ndarray) -> Any:
+    def other_items(own: Any, items: np.ndarray, prove: bool = True) -> Any:
         rows = made_up_samples(own, items)
         rows["item"] += 1
         return rows

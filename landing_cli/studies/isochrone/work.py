@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.reach.facet_work import solve_items as solve_facets
+from landing_cli.reach.facet_work import solve_without_proofs
 from landing_cli.reach.free_descent import Surroundings, prepare
 from landing_cli.reach.records import FacetSolutions, LandingCase
 from landing_cli.studies.isochrone.halving import Brackets, halves, middles, wide
@@ -75,7 +76,7 @@ def case_at(case: LandingCase, tof_s: float) -> LandingCase:
     return replace(case, name=f"{case.name}_{tof_s:.12g}s", tof_s=float(tof_s))
 
 
-def solve_at(study: Study, state: int, tof_s: float, facets: Items) -> FacetSolutions:
+def solve_at(study: Study, state: int, tof_s: float, facets: Items, prove: bool = True) -> FacetSolutions:
     """Solve facets at one time of flight, as `reach run` does.
 
     Parameters
@@ -88,6 +89,8 @@ def solve_at(study: Study, state: int, tof_s: float, facets: Items) -> FacetSolu
         Time of flight.
     facets : (k,) int
         Facets, 0-based.
+    prove : bool
+        As for :func:`solve_items`.
 
     Returns
     -------
@@ -95,10 +98,12 @@ def solve_at(study: Study, state: int, tof_s: float, facets: Items) -> FacetSolu
         In ascending facet order.
     """
     prepared = prepare(case_at(study.cases[state], tof_s), study.shared)
+    if not prove:
+        return solve_without_proofs(prepared, facets)
     return solve_facets((prepared,), study.facets, facets)
 
 
-def solve_items(study: Study, items: Items) -> Rows:
+def solve_items(study: Study, items: Items, prove: bool = True) -> Rows:
     """Solve a chunk of items.
 
     Parameters
@@ -107,6 +112,8 @@ def solve_items(study: Study, items: Items) -> Rows:
         The study.
     items : (k,) int
         What to solve.
+    prove : bool
+        Whether what the ellipsoid stops is to be proved unreachable; no verdict depends on it.
 
     Returns
     -------
@@ -120,7 +127,7 @@ def solve_items(study: Study, items: Items) -> Rows:
     begins = np.flatnonzero(np.diff(ordered // study.facets, prepend=-1))
     for begin, end in zip(begins, [*begins[1:], len(ordered)], strict=True):
         tof_s = float(study.grid.times_s(place[begin]))
-        solved = solve_at(study, int(state[begin]), tof_s, facet[begin:end]).rows
+        solved = solve_at(study, int(state[begin]), tof_s, facet[begin:end], prove).rows
         for name in _TAKEN:
             rows[name][begin:end] = solved[name]
     return rows
@@ -154,7 +161,7 @@ def halve_changes(study: Study, changes: Rows) -> Rows:
     while len((brackets := brackets.taken(wide(brackets))).series):
         state, facet = np.divmod(brackets.series, study.facets)
         items = study.items(state, middles(brackets), facet)
-        found.append(solve_items(study, items))
+        found.append(solve_items(study, items, prove=False))
         verdicts = np.empty(len(items), dtype=np.uint8)
         verdicts[np.argsort(items)] = found[-1]["verdict"]
         brackets = halves(brackets, verdicts)
