@@ -81,7 +81,7 @@ def _chosen(loaded: LoadedScenario, reach: Reach, section: DisperseSection) -> l
     for index, name in enumerate(section.cases):
         if name not in names:
             problem = Problem(
-                ("disperse", "cases", index), f"no case '{name}'", f"take of {', '.join(names)}"
+                ("disperse", "cases", index), f"no case '{name}'", f"take one of {', '.join(names)}"
             )
             raise refusal([problem], loaded.places, loaded.source)
     return list(section.cases)
