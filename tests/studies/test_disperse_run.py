@@ -220,7 +220,11 @@ def test_nothing_feasible_is_exit_4(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("change", "arguments", "told"),
     [
-        ("  cases: [high_800s]", (), "disperse.cases.0: no case 'high_800s'; take one of high_700s, high_600s"),
+        (
+            "  cases: [high_800s]",
+            (),
+            "disperse.cases.0: no case 'high_800s'; take one of high_700s, high_600s",
+        ),
         ("", ("--case", "high"), "disperse.cases.0"),
         ("", ("--samples", "0"), "--set disperse.samples=0: disperse.samples: 0 is not at least 1"),
         ("  axes: radial_along_cross", (*OVER_POLE, *AT_REST), "take body axes"),
