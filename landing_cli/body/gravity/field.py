@@ -1,6 +1,6 @@
 """One record for every gravity model: a kind and a flat parameter array.
 
-The compiled kernels take ``(kind, params)``, so that a solver compiles once for all models.
+The compiled kernels take ``(kind, params)``, so that a solver compiles once for all models (see `models`).
 """
 
 from __future__ import annotations
@@ -20,6 +20,10 @@ class GravityKind(IntEnum):
     DIPOLE = 2
     POLYHEDRON = 3
     INTERPOLATED = 4
+
+
+COSTLY = (GravityKind.POLYHEDRON, GravityKind.INTERPOLATED)
+"""Models of every facet: microseconds to fractions of a millisecond a point."""
 
 
 @dataclass(frozen=True, eq=False)
