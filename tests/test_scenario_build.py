@@ -49,7 +49,7 @@ def test_the_body_is_moved_to_its_centre_of_mass_unless_told_otherwise(tmp_path:
     assert left.vertices[0, 0] == 320
 
 
-@pytest.mark.parametrize("model", ["point_mass", "harmonics", "dipole", "polyhedron", "interpolated"])
+@pytest.mark.parametrize("model", ["point_mass", "harmonics", "dipole", "polyhedron"])
 def test_every_gravity_model_is_built(tmp_path: Path, model: str) -> None:
     field = built(tmp_path, f"body.gravity={{model: {model}, gm_m3_s2: 2.7}}").asteroid.gravity
     assert field.kind.name == model.upper()

@@ -1,20 +1,18 @@
-"""The cube about the site in which a costly field is interpolated."""
+"""The box above the site in which a costly field is interpolated."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from landing_cli.body.gravity.interpolated import Cube
+from landing_cli.body.gravity.interpolated import Box
 from landing_cli.observe.records import ObserveCase
 
 MARGIN = 0.5
 """Room on every side of start and site, in their distance: for the bends that landmarks ask for."""
-REACH, MOST_NEAR = 6.0, 40
-"""Near the ground the field shall be as good as the flight's other figures: 1e-8 of itself."""
 
 
-def cube_of(case: ObserveCase) -> Cube:
-    """Place the cube: the start and the site well inside.
+def box_of(case: ObserveCase) -> Box:
+    """Place the box: its floor in the plane of the site's facet, the start and the site well inside.
 
     Parameters
     ----------
@@ -23,10 +21,16 @@ def cube_of(case: ObserveCase) -> Cube:
 
     Returns
     -------
-    Cube
+    Box
         A path that leaves it meets the polyhedron itself.
     """
-    middle = 0.5 * (case.position_m + case.frame.origin_m)
-    between = case.position_m - case.frame.origin_m
-    room = MARGIN * float(np.linalg.norm(between))
-    return Cube(middle, 0.5 * float(np.abs(between).max()) + room)
+    up = case.frame.normal
+    # the axis least along the normal gives the first horizontal direction
+    across = np.cross(np.eye(3)[int(np.argmin(np.abs(up)))], up)
+    across /= np.linalg.norm(across)
+    axes = np.stack([across, np.cross(up, across), up])
+    start = axes @ (case.position_m - case.frame.origin_m)
+    room = MARGIN * float(np.linalg.norm(start))
+    lower, upper = np.minimum(start, 0.0) - room, np.maximum(start, 0.0) + room
+    lower[2] = 0.0
+    return Box(case.frame.origin_m, axes, lower, upper)

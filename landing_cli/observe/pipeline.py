@@ -245,9 +245,9 @@ def _solver_case(section: ObserveSection, case: ObserveCase) -> tuple[ObserveCas
     if section.gravity != "interpolated":
         return case, {"gravity": case.asteroid.gravity.kind.name.lower()}
     from landing_cli.body.gravity.interpolated import interpolated_field
-    from landing_cli.observe.gravity_box import MOST_NEAR, REACH, cube_of
+    from landing_cli.observe.gravity_box import box_of
 
-    fitted = interpolated_field(case.asteroid.gravity, cube_of(case), REACH, MOST_NEAR)
+    fitted = interpolated_field(case.asteroid.gravity, box_of(case))
     told: dict[str, Parameter] = {
         "gravity": "interpolated",
         "gravity_error_relative": fitted.error,

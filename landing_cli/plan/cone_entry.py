@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.body.gravity.field import COSTLY
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.optimize.cone_program import ConeOptions, ConeProgram, ConeSolution, solve_cone_program
 from landing_cli.plan.records import PlanCase
@@ -122,7 +122,7 @@ def search_case(case: PlanCase) -> PlanCase:
         by seconds, and evaluating thousands of facets at every node of every trial is saved. The last solve
         is always in the case's own field. Otherwise the case itself.
     """
-    if case.asteroid.gravity.kind not in COSTLY:
+    if case.asteroid.gravity.kind != GravityKind.POLYHEDRON:
         return case
     return replace(case, asteroid=replace(case.asteroid, gravity=point_mass_field(case.asteroid.gm_m3_s2)))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.body.gravity.field import COSTLY, GravityField
+from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.flight.bezier_curve import bezier_basis
@@ -26,7 +26,7 @@ _TIME_NODES = 33
 def pricing_field(case: PlanCase) -> GravityField:
     """Return the field that prices curves: the case's own, or a point mass in place of a polyhedron."""
     field = case.asteroid.gravity
-    return point_mass_field(case.asteroid.gm_m3_s2) if field.kind in COSTLY else field
+    return point_mass_field(case.asteroid.gm_m3_s2) if field.kind == GravityKind.POLYHEDRON else field
 
 
 def chebyshev_nodes(least: float, greatest: float, count: int) -> FloatArray:

@@ -13,7 +13,6 @@ from landing_cli.body.gravity.coefficients import degree2_from_mesh, dipole_from
 from landing_cli.body.gravity.dipole import dipole_field
 from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.harmonics import harmonics_field
-from landing_cli.body.gravity.interpolated import interpolated_field
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.body.gravity.polyhedron import polyhedron_field
 from landing_cli.body.mass_properties import centred, mass_properties
@@ -24,13 +23,7 @@ from landing_cli.scenario.constants import GRAVITATIONAL_CONSTANT
 from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.messages import KeyPath, Problem, dotted, refusal
 from landing_cli.scenario.schema import Reach, Scenario
-from landing_cli.scenario.schema_body import (
-    AnyGravity,
-    DipoleGravity,
-    HarmonicsGravity,
-    InterpolatedGravity,
-    PointMassGravity,
-)
+from landing_cli.scenario.schema_body import AnyGravity, DipoleGravity, HarmonicsGravity, PointMassGravity
 from landing_cli.sources.shape_files import read_shape
 from landing_cli.sources.shape_search import find_shape
 
@@ -192,10 +185,7 @@ def _gravity_field(gravity: AnyGravity, gm_m3_s2: float, mesh: Mesh) -> GravityF
         return _harmonics(gravity, gm_m3_s2, mesh)
     if isinstance(gravity, DipoleGravity):
         return _dipole(gravity, gm_m3_s2, mesh)
-    polyhedron = polyhedron_field(mesh.vertices, mesh.faces, gm_m3_s2)
-    if isinstance(gravity, InterpolatedGravity):
-        return interpolated_field(polyhedron).field
-    return polyhedron
+    return polyhedron_field(mesh.vertices, mesh.faces, gm_m3_s2)
 
 
 def _harmonics(gravity: HarmonicsGravity, gm_m3_s2: float, mesh: Mesh) -> GravityField:

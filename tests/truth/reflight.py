@@ -11,10 +11,6 @@ from scipy.integrate import solve_ivp
 def gravity(problem: Problem, r: np.ndarray) -> np.ndarray:
     """Acceleration of gravity, closed form (not a derivative of the potential)."""
     kind, gm, *rest = problem.gravity
-    if kind == "polyhedron":
-        from uniform import pull
-
-        return pull(problem, r)[0][0]
     d = np.linalg.norm(r)
     if kind == "dipole":
         fraction, separation = rest

@@ -22,10 +22,6 @@ class GravityKind(IntEnum):
     INTERPOLATED = 4
 
 
-COSTLY = (GravityKind.POLYHEDRON, GravityKind.INTERPOLATED)
-"""Models of every facet: microseconds to fractions of a millisecond a point."""
-
-
 @dataclass(frozen=True, eq=False)
 class GravityField:
     """A gravity field, fixed in the body frame about the centre of mass.

@@ -1,164 +1,170 @@
-"""Pieces of a polyhedron's field: in every cube the near facets as they are, the far ones as a polynomial.
+"""Polynomial pieces of a potential over a box: fitted where the body is not, split until they are fine.
 
-The pull of a facet is smooth and harmonic away from it. So a cube is divided in eight until few facets are
-near it; those are kept, and the pull of all others is a harmonic polynomial in the coordinates of the cube,
--1 to 1. A child inherits its parent's polynomial, which it holds exactly, and adds that of the facets that
-were near the parent and are far from the child, fitted to their pull at points of Chebyshev density by
-least squares. (The downward pass of the fast multipole method, Greengard & Rokhlin 1987, by fits for
-multipoles.)
+A piece is a polynomial of total degree n in the local coordinates of a box, -1 to 1. Its Chebyshev
+coefficients are the least-squares fit of its gradient to the exact acceleration at points of Chebyshev
+density; they are turned into powers for Horner's scheme. A box that holds part of the surface is halved
+across its longest side, as is a piece whose gradient errs by more than the tolerance at other points.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from landing_cli.body.gravity.interpolated_kernels import DEGREE, FACET, POWERS, fill_pulls
+from landing_cli.body.gravity.field import GravityField
+from landing_cli.body.gravity.field_values import accelerations, gradients, potentials
+from landing_cli.body.gravity.interpolated_kernels import DEGREE, PER_PIECE
 from landing_cli.body.gravity.kernel_types import FloatArray
+from landing_cli.body.gravity.triangle_boxes import triangles_in_box
 
 IntArray = NDArray[np.int64]
 
-MOST_DIVISIONS = 30
-_FIT_POINTS = 4 * (DEGREE + 1) ** 2 // 3
+_FIT_POINTS, _CHECK_POINTS = 180, 40
+_UNFITTED = 0
 
 
 @dataclass(frozen=True, eq=False)
-class Facets:
-    """What the kernels read of every facet.
+class TurnedPolyhedron:
+    """A polyhedron's field in axes of its own.
 
     Attributes
     ----------
-    density : float, 1/s2
-        G rho.
-    table : (m, FACET) float
-        Of every facet three corners, the normal, twice the area; of each edge its length and outward normal.
-    lower, upper : (m, 3) float, m
-        Corners of the box around each facet.
+    field : GravityField
+        Of a polyhedron.
+    origin_m : (3,) float, m, body frame
+    axes : (3, 3) float
+        Rows: the unit vectors in the body frame.
     """
 
-    density: float
-    table: FloatArray
-    lower: FloatArray
-    upper: FloatArray
+    field: GravityField
+    origin_m: FloatArray
+    axes: FloatArray
 
-    @classmethod
-    def of(cls, corners: FloatArray, density: float) -> Facets:
-        """Prepare facets (m, 3, 3), m, counter-clockwise seen from outside."""
-        along = np.roll(corners, -1, axis=1) - corners
-        areas = np.cross(along[:, 0], along[:, 1])
-        twice_area = np.linalg.norm(areas, axis=1, keepdims=True)
-        normals = areas / twice_area
-        length = np.linalg.norm(along, axis=2, keepdims=True)
-        edges = np.concatenate([length, np.cross(along / length, normals[:, None])], axis=2)
-        m = len(corners)
-        table = np.hstack([corners.reshape(m, 9), normals, twice_area, edges.reshape(m, 12)])
-        assert table.shape[1] == FACET
-        return cls(density, table, corners.min(axis=1), corners.max(axis=1))
+    def to_body(self, points: FloatArray) -> FloatArray:
+        """Return points (k, 3) of these axes in the body frame, m."""
+        return np.asarray(points @ self.axes + self.origin_m)
 
-    def near(self, chosen: IntArray, center: FloatArray, distance: float) -> NDArray[np.bool_]:
-        """Tell which of chosen facets' own boxes come so near a point, along every axis."""
-        apart = (self.lower[chosen] > center + distance) | (self.upper[chosen] < center - distance)
-        return np.asarray(~apart.any(axis=1))
+    def potential(self, point: FloatArray) -> float:
+        """Return U at a point (3,), m2/s2."""
+        return float(potentials(self.field, self.to_body(point))[0])
 
-    def pulls(self, chosen: IntArray, points: FloatArray) -> FloatArray:
-        """Return the pull of chosen facets at points (k, 3), (k, 3) m/s2."""
-        found = np.empty((len(points), 3))
-        fill_pulls(self.table.ravel(), chosen, points, found)
-        return self.density * found
+    def acceleration(self, points: FloatArray) -> FloatArray:
+        """Return g at points (k, 3), (k, 3), m/s2."""
+        return np.asarray(accelerations(self.field, self.to_body(points)) @ self.axes.T)
+
+    def holds(self, point: FloatArray) -> bool:
+        """Tell whether a point (3,) lies inside: there the Laplacian of U is -4 pi G rho, outside 0."""
+        trace = np.trace(gradients(self.field, self.to_body(point))[0])
+        return bool(trace < -2.0 * np.pi * self.field.params[2])
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
-    """A cube that is not divided.
+class Pieces:
+    """A binary tree of boxes and their polynomials.
 
     Attributes
     ----------
-    node : int
-        Its place in the tree.
-    center : (3,) float, m
-    half : float, m
-    coefficients : (c, 3) float, m/s2
-        In the order of Horner's scheme: powers of x, then y, then z, falling.
-    near : (k,) int
-        Facets.
+    tree : (t,) int
+        What is at every node, the root first: the first of its two children, which follow each other; 0
+        where nothing is fitted; or -(1 + piece).
+    coefficients : (p, c) float, m2/s2
+        Of every piece, in the order of Horner's scheme: powers of x, then y, then z, falling.
+    center, half : (p, 3) float, m
+        The boxes of the pieces.
     """
 
-    node: int
-    center: FloatArray
-    half: float
+    tree: IntArray
     coefficients: FloatArray
-    near: IntArray
+    center: FloatArray
+    half: FloatArray
 
 
 def fit_pieces(
-    facets: Facets, center: FloatArray, half: float, reach: float, most_near: int
-) -> tuple[IntArray, list[Piece]]:
-    """Divide a cube into pieces and fit what is far from each.
+    body: TurnedPolyhedron,
+    triangles: FloatArray,
+    center: FloatArray,
+    half: FloatArray,
+    tolerance: float,
+    most_halvings: int,
+) -> Pieces:
+    """Fit a potential over the part of a box that lies outside a body.
 
     Parameters
     ----------
-    facets : Facets
-        The polyhedron.
-    center : (3,) float, m
-        The cube's.
-    half : float, m
-        Half its side.
-    reach : float
-        Facets are near up to this far from a cube, in halves of its side.
-    most_near : int
-        Cubes near more facets are divided.
+    body : TurnedPolyhedron
+        The exact field, in the axes of the box.
+    triangles : (m, 3, 3) float, m
+        The body's surface, in the same axes.
+    center, half : (3,) float, m
+        The box.
+    tolerance : float
+        Largest error of the acceleration in a piece, over the acceleration.
+    most_halvings : int
+        Boxes that would need more stay unfitted.
 
     Returns
     -------
-    tree : (t,) int
-        At every node the first of its eight children, which follow each other, that of x below the middle
-        first, then y, then z; 0 at pieces.
-    pieces : list of Piece
+    Pieces
     """
-    tree: list[int] = [0]
-    pieces: list[Piece] = []
-    hand_down = partial(_handed_down, facets, reach)
-    every = np.arange(len(facets.table))
-    waiting = [(Piece(0, center, half, *hand_down(np.zeros((POWERS, 3)), every, center, half)), 0)]
+    tree = [_UNFITTED]
+    found: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+    waiting = [(0, center, half, triangles, 0)]
     while waiting:
-        piece, depth = waiting.pop()
-        if len(piece.near) <= most_near or depth == MOST_DIVISIONS:
-            pieces.append(piece)
+        node, at, size, near, depth = waiting.pop()
+        near = triangles_in_box(near, at, size)
+        if len(near) == 0:
+            if body.holds(at):
+                continue
+            fit = _fit(body, at, size)
+            if _error(body, fit, at, size) <= tolerance:
+                tree[node] = -(1 + len(found))
+                found.append((fit, at, size))
+                continue
+        if depth == most_halvings:
             continue
-        tree[piece.node] = len(tree)
-        h = 0.5 * piece.half
-        for octant, to_child in enumerate(_to_children()):
-            at = piece.center + h * (2.0 * _bits(octant) - 1.0)
-            given = hand_down(to_child @ piece.coefficients, piece.near, at, h)
-            waiting.append((Piece(len(tree), at, h, *given), depth + 1))
-            tree.append(0)
-    return np.array(tree, dtype=np.int64), pieces
+        tree[node] = len(tree)
+        tree += [_UNFITTED, _UNFITTED]
+        axis = int(np.argmax(size))
+        child, step = size.copy(), np.zeros(3)
+        child[axis], step[axis] = 0.5 * size[axis], 0.5 * size[axis]
+        waiting.append((tree[node], at - step, child, near, depth + 1))
+        waiting.append((tree[node] + 1, at + step, child, near, depth + 1))
+    fits, centers, halves = zip(*found, strict=True) if found else ([], [], [])
+    return Pieces(
+        np.array(tree, dtype=np.int64),
+        np.array(fits).reshape(-1, PER_PIECE),
+        np.array(centers).reshape(-1, 3),
+        np.array(halves).reshape(-1, 3),
+    )
 
 
-def _handed_down(
-    facets: Facets, reach: float, inherited: FloatArray, near: IntArray, center: FloatArray, half: float
-) -> tuple[FloatArray, IntArray]:
-    """Coefficients of a cube whose parent is near ``near``, and the facets that are still near."""
-    kept = facets.near(near, center, (1.0 + reach) * half)
-    if kept.all():
-        return inherited, near
-    points, solve = _scheme()
-    return inherited + solve @ facets.pulls(near[~kept], center + half * points), near[kept]
-
-
-def _bits(octant: int) -> FloatArray:
-    return np.array([octant >> axis & 1 for axis in range(3)], dtype=np.float64)
-
-
-@lru_cache(maxsize=1)
-def powers() -> IntArray:
+@lru_cache(maxsize=4)
+def powers(degree: int) -> IntArray:
     """Exponents of x, y, z of every coefficient, in the order of Horner's scheme, (c, 3) int."""
-    falling = range(DEGREE, -1, -1)
-    every = [(i, j, k) for i in falling for j in falling for k in falling if i + j + k <= DEGREE]
+    falling = range(degree, -1, -1)
+    every = [(i, j, k) for i in falling for j in falling for k in falling if i + j + k <= degree]
     return np.array(every, dtype=np.int64)
+
+
+def probe_points(count: int, first: float) -> FloatArray:
+    """Points over the cube from -1 to 1, half of them on its faces, where fits err most.
+
+    Parameters
+    ----------
+    count : int
+        How many.
+    first : float
+        Different numbers give different points.
+
+    Returns
+    -------
+    (count, 3) float
+    """
+    return np.clip(1.3 * spread_points(count, first), -1.0, 1.0)
 
 
 def spread_points(count: int, first: float) -> FloatArray:
@@ -176,41 +182,66 @@ def spread_points(count: int, first: float) -> FloatArray:
     return np.asarray(2.0 * ((first + np.arange(1, count + 1)[:, None] * steps) % 1.0) - 1.0)
 
 
-@lru_cache(maxsize=1)
-def _scheme() -> tuple[FloatArray, FloatArray]:
-    """Points of the fit, and what takes values there to coefficients: (c, k), all harmonic."""
-    order, points = powers(), np.cos(np.pi * 0.5 * (spread_points(_FIT_POINTS, 0.5) + 1.0))
-    harmonic = _harmonic_powers(order)
-    values = np.prod(points[:, None] ** order, axis=2) @ harmonic
-    return points, np.asarray(harmonic @ np.linalg.pinv(values))
+def _fit(body: TurnedPolyhedron, center: FloatArray, half: FloatArray) -> FloatArray:
+    points, solve, to_powers, constant = _scheme()
+    g = body.acceleration(center + half * points)
+    coefficients = to_powers @ (solve @ (g * half).ravel())
+    # the gradient leaves the constant open
+    coefficients[constant] = body.potential(center)
+    return np.asarray(coefficients)
 
 
-def _harmonic_powers(order: IntArray) -> FloatArray:
-    """Orthonormal coefficients of all polynomials whose Laplacian is 0, (c, (DEGREE + 1)^2)."""
-    place = {tuple(exponents): i for i, exponents in enumerate(order.tolist())}
-    laplacian = np.zeros((POWERS, POWERS))
-    for column, exponents in enumerate(order.tolist()):
-        for axis, n in enumerate(exponents):
-            if n >= 2:
-                lower = tuple(e - 2 * (a == axis) for a, e in enumerate(exponents))
-                laplacian[place[lower], column] += n * (n - 1)
-    return np.asarray(np.linalg.svd(laplacian)[2][-((DEGREE + 1) ** 2) :].T)
+def _error(body: TurnedPolyhedron, fit: FloatArray, center: FloatArray, half: FloatArray) -> float:
+    """Largest error of the acceleration at points of their own, relative."""
+    points, slopes = _check_scheme()
+    exact = body.acceleration(center + half * points)
+    wrong = (slopes @ fit).T / half - exact
+    return float((np.linalg.norm(wrong, axis=1) / np.linalg.norm(exact, axis=1)).max())
 
 
 @lru_cache(maxsize=1)
-def _to_children() -> list[FloatArray]:
-    """Matrices (c, c) from the coefficients of a cube to those of each of its eight children.
+def _scheme() -> tuple[FloatArray, FloatArray, FloatArray, int]:
+    """Points of the fit, its pseudo-inverse, Chebyshev to powers, and the place of the constant."""
+    order = powers(DEGREE)
+    points = np.cos(np.pi * 0.5 * (spread_points(_FIT_POINTS, 0.5) + 1.0))
+    values = chebyshev.chebvander(points, DEGREE)
+    derivative = np.stack([chebyshev.chebval(points, _slope(i)) for i in range(DEGREE + 1)], axis=-1)
+    columns = []
+    for axis in range(3):
+        factors = [(derivative if a == axis else values)[:, a][:, order[:, a]] for a in range(3)]
+        columns.append(factors[0] * factors[1] * factors[2])
+    matrix = np.stack(columns, axis=1).reshape(3 * _FIT_POINTS, -1)
+    constant = int(np.flatnonzero(order.sum(axis=1) == 0)[0])
+    solve = np.linalg.pinv(matrix)
+    solve[constant] = 0.0  # the gradient does not know it
+    turned = np.array([np.append(p, np.zeros(DEGREE - i)) for i, p in enumerate(_chebyshev_in_powers())]).T
+    to_powers = np.prod([turned[order[:, a][:, None], order[:, a][None]] for a in range(3)], axis=0)
+    return points, np.asarray(solve, dtype=np.float64), np.asarray(to_powers), constant
 
-    A child's coordinate is twice the parent's, more or less 1.
-    """
-    order = powers()
-    moved = np.zeros((2, DEGREE + 1, DEGREE + 1))
-    for upper in (0, 1):
-        for i in range(DEGREE + 1):
-            moved[upper, : i + 1, i] = (np.polynomial.Polynomial([upper - 0.5, 0.5]) ** i).coef
-    matrices = []
-    for octant in range(8):
-        sides = _bits(octant).astype(int)
-        factors = [moved[sides[a]][order[:, a][:, None], order[:, a][None]] for a in range(3)]
-        matrices.append(np.asarray(factors[0] * factors[1] * factors[2]))
-    return matrices
+
+@lru_cache(maxsize=1)
+def _check_scheme() -> tuple[FloatArray, FloatArray]:
+    """Points of the check, and what takes coefficients to the gradient there, (3, k, c)."""
+    points = probe_points(_CHECK_POINTS, 0.25)
+    return points, _slope_matrix(points)
+
+
+def _slope_matrix(points: FloatArray) -> FloatArray:
+    """Matrices (3, k, c) from coefficients to the local gradient of a piece at points (k, 3), -1 to 1."""
+    order = powers(DEGREE)
+    value = points[:, None, :] ** order
+    lower = np.where(order > 0, order * points[:, None, :] ** np.maximum(order - 1, 0), 0.0)
+    return np.stack(
+        [
+            np.prod(np.stack([(lower if a == axis else value)[:, :, a] for a in range(3)]), axis=0)
+            for axis in range(3)
+        ]
+    )
+
+
+def _slope(i: int) -> FloatArray:
+    return np.asarray(chebyshev.chebder(np.eye(DEGREE + 1)[i]))
+
+
+def _chebyshev_in_powers() -> list[FloatArray]:
+    return [np.asarray(chebyshev.cheb2poly(np.eye(DEGREE + 1)[i][: i + 1])) for i in range(DEGREE + 1)]

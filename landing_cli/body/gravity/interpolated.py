@@ -1,7 +1,9 @@
-"""A polyhedron's field, interpolated: near facets exactly, far ones as polynomials: fast, nearly exact.
+"""A polyhedron's field, interpolated over a box outside the body: far faster there, exact elsewhere.
 
-Space is divided into cubes (`fitted_pieces`); from one to the next the field jumps by no more than its error,
-and the gradient is that of the field. Outside the first cube the polyhedron itself is evaluated.
+The potential is a polynomial on every piece of the box that lies outside the body and could be fitted to
+within the tolerance (`fitted_pieces`); acceleration and gradient are its derivatives, so that the field stays
+conservative. Anywhere else, near edges of facets above all, the polyhedron itself is evaluated: the field is
+nowhere worse than what is measured.
 """
 
 from __future__ import annotations
@@ -13,32 +15,34 @@ import numpy as np
 from landing_cli.body.gravity.checks import checked_number
 from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.field_values import accelerations_and_gradients
-from landing_cli.body.gravity.fitted_pieces import Facets, Piece, fit_pieces, spread_points
-from landing_cli.body.gravity.interpolated_kernels import FACET, HEADER, POWERS
+from landing_cli.body.gravity.fitted_pieces import Pieces, TurnedPolyhedron, fit_pieces, probe_points
+from landing_cli.body.gravity.interpolated_kernels import HEADER
 from landing_cli.body.gravity.kernel_types import FloatArray
 from landing_cli.body.gravity.polyhedron_records import recorded_corners
 from landing_cli.errors import InputRefused
 
-FARTHEST = 8.0
-"""Half the side of the cube that is divided around a body, in the body's largest radii."""
-REACH, MOST_NEAR = 1.5, 160
-_PROBED_PIECES = 400
-_PROBES = 3
+TOLERANCE = 1e-9
+MOST_HALVINGS = 9
+_PROBE_POINTS = 40
 
 
 @dataclass(frozen=True, eq=False)
-class Cube:
-    """A cube along the body's axes.
+class Box:
+    """A box in axes of its own.
 
     Attributes
     ----------
-    center_m : (3,) float, m
-    half_m : float, m
-        Half its side.
+    origin_m : (3,) float, m, body frame
+    axes : (3, 3) float
+        Rows: its unit vectors in the body frame.
+    lower_m, upper_m : (3,) float, m
+        Its extent along its axes, from the origin.
     """
 
-    center_m: FloatArray
-    half_m: float
+    origin_m: FloatArray
+    axes: FloatArray
+    lower_m: FloatArray
+    upper_m: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +54,13 @@ class InterpolatedField:
     field : GravityField
         Of the kind ``INTERPOLATED``.
     error : float
-        Largest error of the acceleration at points that the fit did not see, over the acceleration there, or
-        over GM/R^2 with the body's largest radius R where that is more and the point nearer than R.
+        Largest error of the acceleration over the acceleration, at points that the fit did not see.
     gradient_error : float
-        The same of the gradient, by Frobenius norms, over GM/R^3.
+        The same of the gradient, by Frobenius norms.
     checked_points : int
     pieces : int
-    near : float
-        Facets that are evaluated in a piece, on average.
+    covered : float
+        Share of the box's volume that the pieces cover; the body and its edges have the rest.
     """
 
     field: GravityField
@@ -65,24 +68,24 @@ class InterpolatedField:
     gradient_error: float
     checked_points: int
     pieces: int
-    near: float
+    covered: float
 
 
 def interpolated_field(
-    polyhedron: GravityField, cube: Cube | None = None, reach: float = REACH, most_near: int = MOST_NEAR
+    polyhedron: GravityField, box: Box, tolerance: float = TOLERANCE, most_halvings: int = MOST_HALVINGS
 ) -> InterpolatedField:
-    """Interpolate a polyhedron's field.
+    """Interpolate a polyhedron's field over a box.
 
     Parameters
     ----------
     polyhedron : GravityField
         From ``polyhedron_field``.
-    cube : Cube, optional
-        Where it is wanted; by default around the body, FARTHEST times its largest radius far.
-    reach : float
-        Facets are evaluated as they are up to this far from a piece, in halves of its side; more is better.
-    most_near : int
-        Pieces near more facets are divided.
+    box : Box
+        Where it is wanted. A box whose floor lies in a facet's plane can be fitted down to that facet.
+    tolerance : float
+        Largest error of the acceleration in a piece, over the acceleration.
+    most_halvings : int
+        How often the box may be halved; what would need more is left to the polyhedron.
 
     Returns
     -------
@@ -91,7 +94,7 @@ def interpolated_field(
     Raises
     ------
     InputRefused
-        The field is no polyhedron's, the cube is empty, or the reach not positive.
+        The field is no polyhedron's, the box is empty, or the tolerance is not positive.
     """
     if polyhedron.kind != GravityKind.POLYHEDRON:
         name = polyhedron.kind.name.lower()
@@ -100,111 +103,41 @@ def interpolated_field(
             where="gravity",
             fix="fly in it directly, or take a polyhedron",
         )
-    corners = recorded_corners(polyhedron.params)
-    radius = float(np.linalg.norm(corners, axis=1).max())
-    if cube is None:
-        cube = Cube(np.zeros(3), FARTHEST * radius)
-    for name, value in (("half side of the cube", cube.half_m), ("reach", reach)):
-        checked_number(name, value, above=0.0)
-    center = np.asarray(cube.center_m, dtype=np.float64)
-    facets = Facets.of(corners.reshape(-1, 3, 3), float(polyhedron.params[2]))
-    tree, pieces = fit_pieces(facets, center, cube.half_m, reach, most_near)
-    params = _packed(polyhedron, facets, np.append(center, cube.half_m), tree, pieces)
-    field = GravityField(GravityKind.INTERPOLATED, params)
-    error, gradient_error, points = _measured(field, polyhedron, pieces, radius)
-    near = float(np.mean([len(piece.near) for piece in pieces]))
-    return InterpolatedField(field, error, gradient_error, points, len(pieces), near)
-
-
-def polyhedron_of(interpolated: GravityField) -> GravityField:
-    """Return the polyhedron's field that an interpolated one stands for."""
-    return GravityField(GravityKind.POLYHEDRON, interpolated.params[int(interpolated.params[0]) :])
-
-
-def is_sound(params: FloatArray) -> bool:
-    """Tell whether an interpolated field's parameters lead nowhere that the kernels must not read.
-
-    Parameters
-    ----------
-    params : (p,) float
-        Finite; what follows the first place that they name is not looked at: it is a polyhedron's.
-    """
-    if len(params) <= HEADER or not _whole(params[:2], HEADER + 1, len(params)):
-        return False
-    end, coefficients = int(params[0]), int(params[1])
-    nodes, seen = np.zeros(1, dtype=np.int64), 0
-    while len(nodes):
-        seen += len(nodes)
-        if seen > len(params) or HEADER + nodes.max() >= coefficients:
-            return False
-        values = params[HEADER + nodes]
-        parents, pieces = values > 0.0, -values[values <= 0.0]
-        # children come after their parents: no way down leads back
-        if not (values[parents] > nodes[parents]).all() or not _whole(values[parents], 1, coefficients):
-            return False
-        if not all(_is_sound_piece(params, piece, coefficients, end) for piece in pieces):
-            return False
-        nodes = (values[parents].astype(np.int64)[:, None] + np.arange(8)).ravel()
-    return True
-
-
-def _is_sound_piece(params: FloatArray, place: float, coefficients: int, end: int) -> bool:
-    if not _whole(place, HEADER + 1, coefficients - 1):
-        return False
-    own = int(place)
-    if not _whole(params[own + 1], 0, coefficients - own - 1):
-        return False
-    near = params[own + 2 : own + 2 + int(params[own + 1])]
-    return _whole(params[own], coefficients, end - 3 * POWERS + 1) and _whole(
-        near, 0, coefficients - FACET + 1
-    )
-
-
-def _whole(values: FloatArray | float, least: int, end: int) -> bool:
-    """Whether all are whole numbers from ``least`` on, below ``end``."""
-    given = np.asarray(values)
-    return bool(((given == np.floor(given)) & (given >= least) & (given < end)).all())
+    checked_number("tolerance", tolerance, above=0.0)
+    lower, upper = np.asarray(box.lower_m, dtype=np.float64), np.asarray(box.upper_m, dtype=np.float64)
+    if not (lower < upper).all():
+        raise InputRefused("the box is empty", where="gravity", fix="give it an extent along every axis")
+    body = TurnedPolyhedron(polyhedron, box.origin_m, box.axes)
+    center, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+    triangles = (recorded_corners(polyhedron.params) - box.origin_m) @ box.axes.T
+    pieces = fit_pieces(body, triangles.reshape(-1, 3, 3), center, half, tolerance, most_halvings)
+    field = GravityField(GravityKind.INTERPOLATED, _packed(polyhedron, box, center, half, pieces))
+    error, gradient_error, points = _measured(field, body, pieces)
+    covered = float((pieces.half.prod(axis=1) / half.prod()).sum())
+    return InterpolatedField(field, error, gradient_error, points, len(pieces.center), covered)
 
 
 def _packed(
-    polyhedron: GravityField, facets: Facets, cube: FloatArray, tree: FloatArray, pieces: list[Piece]
+    polyhedron: GravityField, box: Box, center: FloatArray, half: FloatArray, pieces: Pieces
 ) -> FloatArray:
     """Parameters as `interpolated_kernels` reads them."""
-    table = HEADER + len(tree)
-    lists = table + facets.table.size
-    coefficients = lists + sum(2 + len(piece.near) for piece in pieces)
-    nodes, parts, at = tree.astype(np.float64), [], lists
-    for i, piece in enumerate(pieces):
-        nodes[piece.node] = -at
-        parts.append([coefficients + 3 * POWERS * i, len(piece.near), *(table + FACET * piece.near)])
-        at += len(parts[-1])
-    fits = np.concatenate([piece.coefficients.ravel() for piece in pieces])
-    head = [[coefficients + len(fits), coefficients], cube, nodes, facets.table.ravel()]
-    return np.concatenate([*head, *parts, fits, polyhedron.params])
+    tree, coefficients = pieces.tree.astype(np.float64), pieces.coefficients.ravel()
+    first = HEADER + len(tree)
+    head = [[first + len(coefficients), first], box.origin_m, box.axes.ravel(), center, half]
+    return np.concatenate([*head, tree, coefficients, polyhedron.params])
 
 
-def _measured(
-    field: GravityField, polyhedron: GravityField, pieces: list[Piece], radius: float
-) -> tuple[float, float, int]:
-    """Largest relative errors of g and its gradient, at points that the fit did not see, of many pieces."""
-    chosen = pieces[:: max(1, len(pieces) // _PROBED_PIECES)]
-    # half of the points lie on the boxes' faces, where fits err most
-    local = np.clip(1.3 * spread_points(_PROBES * len(chosen), 0.75), -1.0, 1.0).reshape(len(chosen), -1, 3)
-    center = np.array([piece.center for piece in chosen])[:, None]
-    half = np.array([piece.half for piece in chosen])[:, None, None]
-    points = (center + half * local).reshape(-1, 3)
+def _measured(field: GravityField, body: TurnedPolyhedron, pieces: Pieces) -> tuple[float, float, int]:
+    """Largest relative errors of g and its gradient over all pieces, at points that the fit did not see."""
+    if not len(pieces.center):
+        return 0.0, 0.0, 0
+    local = probe_points(_PROBE_POINTS, 0.75)
+    points = body.to_body((pieces.center[:, None] + pieces.half[:, None] * local).reshape(-1, 3))
     g, G = accelerations_and_gradients(field, points)
-    exact_g, exact_G = accelerations_and_gradients(polyhedron, points)
-    far = np.maximum(np.linalg.norm(points, axis=1) / radius, 1.0)
-    # the field of all mass in a sphere of the largest radius
-    typical = _mass(polyhedron, radius) / (radius * far) ** 2
-    size = np.maximum(np.linalg.norm(exact_g, axis=1), np.where(far > 1.0, 0.0, typical))
-    steep = np.maximum(np.linalg.norm(exact_G, axis=(1, 2)), typical / (radius * far))
-    wrong, wrong_G = np.linalg.norm(g - exact_g, axis=1), np.linalg.norm(G - exact_G, axis=(1, 2))
-    return float((wrong / size).max()), float((wrong_G / steep).max()), len(points)
+    exact_g, exact_G = accelerations_and_gradients(body.field, points)
+    return _largest_share(g - exact_g, exact_g), _largest_share(G - exact_G, exact_G), len(points)
 
 
-def _mass(polyhedron: GravityField, radius: float) -> float:
-    """GM, from the pull far away."""
-    far = np.array([[1e3 * radius, 0.0, 0.0]])
-    return float(np.linalg.norm(accelerations_and_gradients(polyhedron, far)[0])) * (1e3 * radius) ** 2
+def _largest_share(wrong: FloatArray, exact: FloatArray) -> float:
+    sizes = (np.linalg.norm(a.reshape(len(a), -1), axis=1) for a in (wrong, exact))
+    return float(np.divide(*sizes).max())

@@ -1,223 +1,133 @@
-"""Evaluation of an interpolated field: down a tree of cubes; near facets exactly, far ones as a polynomial.
+"""Evaluation of an interpolated field: down the tree of boxes, then Horner's scheme; the polyhedron elsewhere.
 
-The parameters are where the polyhedron's own begin and where the coefficients begin, the center and the half
-side of the first cube, then the tree: at every node the first of its eight children, which follow each other,
-or less the place of its piece. Then come the facets, the pieces (where its coefficients are, how many facets
-are near, and where they are), the coefficients of the pulls of far facets, three a power, and the polyhedron.
-
-The pull of a facet and its gradient, with r from the point to its edges, their outward normals nu in its
-plane, their logarithms L, its height h over the point and its solid angle w (Werner & Scheeres 1996)::
-
-    g = G rho n I,  I = h w - sum_e nu.r L,    dg_i/dr_j = G rho n_i (sum_e nu L - n w)_j
-
-Sums over some facets are no gradient of a potential, so dg_i/dr_j is taken with i <= j everywhere.
+The parameters are where the polyhedron's own begin and where the coefficients begin, the box's origin, axes
+(rows), center and half, the tree, the coefficients piece by piece, and the polyhedron's parameters.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from landing_cli.body.gravity.kernel_types import FloatArray, Params, Symmetric, Vector, VectorAndSymmetric
+from landing_cli.body.gravity.kernel_types import Params, Symmetric, Vector, VectorAndSymmetric
 from landing_cli.body.gravity.polyhedron import (
-    edge_log,
-    edge_log_slope,
-    from_point,
     polyhedron_acceleration,
     polyhedron_acceleration_and_gradient,
     polyhedron_curvature,
     polyhedron_potential,
-    solid_angle,
 )
 from landing_cli.kernel import kernel
 
-DEGREE = 7
-POWERS = (DEGREE + 1) * (DEGREE + 2) * (DEGREE + 3) // 6
-HEADER = 6
-_CENTER, _HALF = 2, 5
-_DENSITY = 2  # where a polyhedron's parameters hold G rho
-FACET = (
-    25  # three corners, the normal, twice the area; of each edge from a corner to the next its length and nu
-)
-_EDGES = 13
+DEGREE = 10
+PER_PIECE = (DEGREE + 1) * (DEGREE + 2) * (DEGREE + 3) // 6
+HEADER = 20
+_ORIGIN, _AXES, _CENTER, _HALF = 2, 5, 14, 17
+_ROUNDING = 1e-9  # of the box: how far outside a point still counts as on its face
 
-# What takes values at +-1/8, 1/4, 3/8 and 1/2 to the slope at 0, exactly for powers below the ninth.
-_SLOPE_AT = (0.125, 0.25, 0.375, 0.5)
-_SLOPE_WEIGHTS = (6.4, -1.6, 32.0 / 105.0, -1.0 / 35.0)
+Fitted = tuple[bool, float, float, float, float, float, float, float, float, float, float]
 
 
 @kernel
-def _piece_at(params: Params, x: float, y: float, z: float) -> tuple[int, float, float, float, float]:
-    """Return the place of the piece that holds a point, 0 for none; where in it, -1 to 1; its half side."""
-    px, py, pz, h = x - params[_CENTER], y - params[_CENTER + 1], z - params[_CENTER + 2], params[_HALF]
-    if not (abs(px) <= h and abs(py) <= h and abs(pz) <= h):
-        return 0, 0.0, 0.0, 0.0, 1.0
+def _fitted_values(params: Params, x: float, y: float, z: float) -> Fitted:
+    """Return whether a piece holds the point, then U, g and its gradient (xx, yy, zz, xy, xz, yz)."""
+    nothing = (False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    dx, dy, dz = x - params[_ORIGIN], y - params[_ORIGIN + 1], z - params[_ORIGIN + 2]
+    a = params[_AXES : _AXES + 9]
+    px = a[0] * dx + a[1] * dy + a[2] * dz - params[_CENTER]
+    py = a[3] * dx + a[4] * dy + a[5] * dz - params[_CENTER + 1]
+    pz = a[6] * dx + a[7] * dy + a[8] * dz - params[_CENTER + 2]
+    hx, hy, hz = params[_HALF], params[_HALF + 1], params[_HALF + 2]
+    reach = 1.0 + _ROUNDING
+    if not (abs(px) <= hx * reach and abs(py) <= hy * reach and abs(pz) <= hz * reach):
+        return nothing
     node = int(params[HEADER])
     while node > 0:
-        h *= 0.5
-        child = (1 if px >= 0.0 else 0) + (2 if py >= 0.0 else 0) + (4 if pz >= 0.0 else 0)
-        px += -h if px >= 0.0 else h
-        py += -h if py >= 0.0 else h
-        pz += -h if pz >= 0.0 else h
-        node = int(params[HEADER + node + child])
-    return -node, px / h, py / h, pz / h, h
-
-
-@kernel
-def _far_pull(params: Params, c: int, px: float, py: float, pz: float) -> Vector:
-    """Return the pull of far facets whose coefficients begin at ``c``."""
-    gx = gy = gz = 0.0
+        # the longest side is halved, the first of equals
+        if hx >= hy and hx >= hz:
+            hx *= 0.5
+            upper = px >= 0.0
+            px += -hx if upper else hx
+        elif hy >= hz:
+            hy *= 0.5
+            upper = py >= 0.0
+            py += -hy if upper else hy
+        else:
+            hz *= 0.5
+            upper = pz >= 0.0
+            pz += -hz if upper else hz
+        node = int(params[HEADER + node + (1 if upper else 0)])
+    if node == 0:
+        return nothing
+    px, py, pz = px / hx, py / hy, pz / hz
+    c = int(params[1]) + (-node - 1) * PER_PIECE
+    # value and derivatives, second ones halved along one axis; f_xy is named fxy
+    f = fx = fy = fz = fxx = fyy = fzz = fxy = fxz = fyz = 0.0
     for i in range(DEGREE + 1):
-        qx = qy = qz = 0.0
+        q = qy = qz = qyy = qzz = qyz = 0.0
         for j in range(i + 1):
-            sx = sy = sz = 0.0
+            s = sz = szz = 0.0
             for _ in range(j + 1):
-                sx = sx * pz + params[c]
-                sy = sy * pz + params[c + 1]
-                sz = sz * pz + params[c + 2]
-                c += 3
-            qx = qx * py + sx
-            qy = qy * py + sy
-            qz = qz * py + sz
-        gx = gx * px + qx
-        gy = gy * px + qy
-        gz = gz * px + qz
-    return gx, gy, gz
-
-
-@kernel
-def _far_gradient(params: Params, c: int, px: float, py: float, pz: float) -> VectorAndSymmetric:
-    """Return that pull and its derivatives xx, yy, zz, xy, xz, yz by the piece's coordinates."""
-    gx = gy = gz = xx = yy = zz = xy = xz = yz = 0.0
-    for i in range(DEGREE + 1):
-        qx = qy = qz = qxy = qxz = qyy = qyz = qzz = 0.0
-        for j in range(i + 1):
-            sx = sy = sz = sxz = syz = szz = 0.0
-            for _ in range(j + 1):
-                sxz = sxz * pz + sx
-                syz = syz * pz + sy
                 szz = szz * pz + sz
-                sx = sx * pz + params[c]
-                sy = sy * pz + params[c + 1]
-                sz = sz * pz + params[c + 2]
-                c += 3
-            qxy = qxy * py + qx
+                sz = sz * pz + s
+                s = s * pz + params[c]
+                c += 1
             qyy = qyy * py + qy
-            qxz = qxz * py + sxz
-            qyz = qyz * py + syz
+            qyz = qyz * py + qz
+            qy = qy * py + q
             qzz = qzz * py + szz
-            qx = qx * py + sx
-            qy = qy * py + sy
             qz = qz * py + sz
-        xx = xx * px + gx
-        xy = xy * px + qxy
-        xz = xz * px + qxz
-        yy = yy * px + qyy
-        yz = yz * px + qyz
-        zz = zz * px + qzz
-        gx = gx * px + qx
-        gy = gy * px + qy
-        gz = gz * px + qz
-    return gx, gy, gz, xx, yy, zz, xy, xz, yz
-
-
-@kernel
-def _facet_terms(params: Params, k: int, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """Return I and sum_e nu L - n w of the facet at ``k``."""
-    ax, ay, az, a = from_point(params, k, x, y, z)
-    bx, by, bz, b = from_point(params, k + 3, x, y, z)
-    cx, cy, cz, c = from_point(params, k + 6, x, y, z)
-    nx, ny, nz = params[k + 9], params[k + 10], params[k + 11]
-    height = ax * nx + ay * ny + az * nz
-    bc, ac, ab = bx * cx + by * cy + bz * cz, ax * cx + ay * cy + az * cz, ax * bx + ay * by + az * bz
-    angle = solid_angle(height * params[k + 12], a * b * c + a * bc + b * ac + c * ab)
-    e = k + _EDGES
-    p, q, r = (
-        edge_log(params[e], a + b),
-        edge_log(params[e + 4], b + c),
-        edge_log(params[e + 8], c + a),
-    )
-    value = height * angle - p * (params[e + 1] * ax + params[e + 2] * ay + params[e + 3] * az)
-    value -= q * (params[e + 5] * bx + params[e + 6] * by + params[e + 7] * bz)
-    value -= r * (params[e + 9] * cx + params[e + 10] * cy + params[e + 11] * cz)
+            q = q * py + s
+        fxx = fxx * px + fx
+        fxy = fxy * px + fy
+        fxz = fxz * px + fz
+        fx = fx * px + f
+        fyy = fyy * px + qyy
+        fyz = fyz * px + qyz
+        fzz = fzz * px + qzz
+        fy = fy * px + qy
+        fz = fz * px + qz
+        f = f * px + q
+    fx, fy, fz = fx / hx, fy / hy, fz / hz
+    fxx, fyy, fzz = 2.0 * fxx / (hx * hx), 2.0 * fyy / (hy * hy), 2.0 * fzz / (hz * hz)
+    fxy, fxz, fyz = fxy / (hx * hy), fxz / (hx * hz), fyz / (hy * hz)
+    # columns of (gradient times axes), then axes' times those
+    ax = fxx * a[0] + fxy * a[3] + fxz * a[6]
+    ay = fxy * a[0] + fyy * a[3] + fyz * a[6]
+    az = fxz * a[0] + fyz * a[3] + fzz * a[6]
+    bx = fxx * a[1] + fxy * a[4] + fxz * a[7]
+    by = fxy * a[1] + fyy * a[4] + fyz * a[7]
+    bz = fxz * a[1] + fyz * a[4] + fzz * a[7]
+    cx = fxx * a[2] + fxy * a[5] + fxz * a[8]
+    cy = fxy * a[2] + fyy * a[5] + fyz * a[8]
+    cz = fxz * a[2] + fyz * a[5] + fzz * a[8]
     return (
-        value,
-        p * params[e + 1] + q * params[e + 5] + r * params[e + 9] - angle * nx,
-        p * params[e + 2] + q * params[e + 6] + r * params[e + 10] - angle * ny,
-        p * params[e + 3] + q * params[e + 7] + r * params[e + 11] - angle * nz,
+        True,
+        f,
+        a[0] * fx + a[3] * fy + a[6] * fz,
+        a[1] * fx + a[4] * fy + a[7] * fz,
+        a[2] * fx + a[5] * fy + a[8] * fz,
+        a[0] * ax + a[3] * ay + a[6] * az,
+        a[1] * bx + a[4] * by + a[7] * bz,
+        a[2] * cx + a[5] * cy + a[8] * cz,
+        a[1] * ax + a[4] * ay + a[7] * az,
+        a[2] * ax + a[5] * ay + a[8] * az,
+        a[2] * bx + a[5] * by + a[8] * bz,
     )
-
-
-@kernel
-def _facet_slopes(
-    params: Params, k: int, x: float, y: float, z: float, lx: float, ly: float, lz: float
-) -> Vector:
-    """Return the derivative of sum_e nu L - n w of the facet at ``k`` along l.
-
-    See ``polyhedron_curvature``.
-    """
-    ax, ay, az, a = from_point(params, k, x, y, z)
-    bx, by, bz, b = from_point(params, k + 3, x, y, z)
-    cx, cy, cz, c = from_point(params, k + 6, x, y, z)
-    nx, ny, nz, twice_area = params[k + 9], params[k + 10], params[k + 11], params[k + 12]
-    bc, ac, ab = bx * cx + by * cy + bz * cz, ax * cx + ay * cy + az * cz, ax * bx + ay * by + az * bz
-    triple = (ax * nx + ay * ny + az * nz) * twice_area
-    dots = a * b * c + a * bc + b * ac + c * ab
-    la, lb, lc = lx * ax + ly * ay + lz * az, lx * bx + ly * by + lz * bz, lx * cx + ly * cy + lz * cz
-    da, db, dc = -la / a, -lb / b, -lc / c
-    triple_slope = -(lx * nx + ly * ny + lz * nz) * twice_area
-    dots_slope = da * (b * c + bc) + db * (a * c + ac) + dc * (a * b + ab)
-    dots_slope -= a * (lb + lc) + b * (la + lc) + c * (la + lb)
-    angle = 2.0 * (dots * triple_slope - triple * dots_slope) / (triple * triple + dots * dots)
-    e = k + _EDGES
-    p, q, r = (
-        edge_log_slope(params[e], a + b, da + db),
-        edge_log_slope(params[e + 4], b + c, db + dc),
-        edge_log_slope(params[e + 8], c + a, dc + da),
-    )
-    return (
-        p * params[e + 1] + q * params[e + 5] + r * params[e + 9] - angle * nx,
-        p * params[e + 2] + q * params[e + 6] + r * params[e + 10] - angle * ny,
-        p * params[e + 3] + q * params[e + 7] + r * params[e + 11] - angle * nz,
-    )
-
-
-@kernel
-def fill_pulls(table: FloatArray, chosen: NDArray[np.int64], points: FloatArray, pulls: FloatArray) -> None:
-    """Write the pull (k, 3) of chosen facets of a table at points (k, 3), without G rho."""
-    for i in range(len(points)):
-        gx = gy = gz = 0.0
-        for f in range(len(chosen)):
-            k = FACET * chosen[f]
-            value = _facet_terms(table, k, points[i, 0], points[i, 1], points[i, 2])[0]
-            gx += value * table[k + 9]
-            gy += value * table[k + 10]
-            gz += value * table[k + 11]
-        pulls[i, 0], pulls[i, 1], pulls[i, 2] = gx, gy, gz
 
 
 @kernel
 def interpolated_potential(params: Params, x: float, y: float, z: float) -> float:
-    """Return U: the polyhedron's, as no flight asks for it."""
+    """Return U."""
+    fitted = _fitted_values(params, x, y, z)
+    if fitted[0]:
+        return fitted[1]
     return polyhedron_potential(params[int(params[0]) :], x, y, z)
 
 
 @kernel
 def interpolated_acceleration(params: Params, x: float, y: float, z: float) -> Vector:
     """Return the gradient of U."""
-    c, px, py, pz, _h = _piece_at(params, x, y, z)
-    if c == 0:
-        return polyhedron_acceleration(params[int(params[0]) :], x, y, z)
-    gx = gy = gz = 0.0
-    for i in range(c + 2, c + 2 + int(params[c + 1])):
-        k = int(params[i])
-        value = _facet_terms(params, k, x, y, z)[0]
-        gx += value * params[k + 9]
-        gy += value * params[k + 10]
-        gz += value * params[k + 11]
-    fx, fy, fz = _far_pull(params, int(params[c]), px, py, pz)
-    m = params[int(params[0]) + _DENSITY]
-    return fx + m * gx, fy + m * gy, fz + m * gz
+    fitted = _fitted_values(params, x, y, z)
+    if fitted[0]:
+        return fitted[2], fitted[3], fitted[4]
+    return polyhedron_acceleration(params[int(params[0]) :], x, y, z)
 
 
 @kernel
@@ -225,70 +135,15 @@ def interpolated_acceleration_and_gradient(
     params: Params, x: float, y: float, z: float
 ) -> VectorAndSymmetric:
     """Return the gradient and the Hessian (xx, yy, zz, xy, xz, yz) of U."""
-    c, px, py, pz, h = _piece_at(params, x, y, z)
-    if c == 0:
-        return polyhedron_acceleration_and_gradient(params[int(params[0]) :], x, y, z)
-    gx = gy = gz = xx = yy = zz = xy = xz = yz = 0.0
-    for i in range(c + 2, c + 2 + int(params[c + 1])):
-        k = int(params[i])
-        value, vx, vy, vz = _facet_terms(params, k, x, y, z)
-        nx, ny, nz = params[k + 9], params[k + 10], params[k + 11]
-        gx += value * nx
-        gy += value * ny
-        gz += value * nz
-        xx += nx * vx
-        yy += ny * vy
-        zz += nz * vz
-        xy += nx * vy
-        xz += nx * vz
-        yz += ny * vz
-    f = _far_gradient(params, int(params[c]), px, py, pz)
-    m = params[int(params[0]) + _DENSITY]
-    return (
-        f[0] + m * gx,
-        f[1] + m * gy,
-        f[2] + m * gz,
-        f[3] / h + m * xx,
-        f[4] / h + m * yy,
-        f[5] / h + m * zz,
-        f[6] / h + m * xy,
-        f[7] / h + m * xz,
-        f[8] / h + m * yz,
-    )
+    fitted = _fitted_values(params, x, y, z)
+    if fitted[0]:
+        return fitted[2:]
+    return polyhedron_acceleration_and_gradient(params[int(params[0]) :], x, y, z)
 
 
 @kernel
 def interpolated_curvature(
     params: Params, x: float, y: float, z: float, lx: float, ly: float, lz: float
 ) -> Symmetric:
-    """Return the derivative of the Hessian of U along (lx, ly, lz).
-
-    Along a line the far facets' gradient is a polynomial: central differences give its slope exactly.
-    """
-    c, px, py, pz, h = _piece_at(params, x, y, z)
-    size = max(abs(lx), abs(ly), abs(lz))
-    if c == 0 or not size > 0.0:
-        return polyhedron_curvature(params[int(params[0]) :], x, y, z, lx, ly, lz)
-    xx = yy = zz = xy = xz = yz = 0.0
-    m = params[int(params[0]) + _DENSITY]
-    for i in range(c + 2, c + 2 + int(params[c + 1])):
-        k = int(params[i])
-        vx, vy, vz = _facet_slopes(params, k, x, y, z, lx, ly, lz)
-        nx, ny, nz = m * params[k + 9], m * params[k + 10], m * params[k + 11]
-        xx += nx * vx
-        yy += ny * vy
-        zz += nz * vz
-        xy += nx * vy
-        xz += nx * vz
-        yz += ny * vz
-    for i in range(2 * len(_SLOPE_AT)):
-        sign = 1.0 - 2.0 * (i % 2)
-        step, weight = sign * _SLOPE_AT[i // 2] / size, sign * _SLOPE_WEIGHTS[i // 2] * size / (h * h)
-        f = _far_gradient(params, int(params[c]), px + step * lx, py + step * ly, pz + step * lz)
-        xx += weight * f[3]
-        yy += weight * f[4]
-        zz += weight * f[5]
-        xy += weight * f[6]
-        xz += weight * f[7]
-        yz += weight * f[8]
-    return xx, yy, zz, xy, xz, yz
+    """Return the derivative of the polyhedron's Hessian along (lx, ly, lz): third derivatives are its own."""
+    return polyhedron_curvature(params[int(params[0]) :], x, y, z, lx, ly, lz)
