@@ -1,4 +1,4 @@
-"""Evaluation of an interpolated field: down the tree of boxes, then Horner's scheme; the polyhedron elsewhere.
+"""Evaluation of an interpolated field: down the tree of boxes, then Horner's scheme; else the polyhedron.
 
 The parameters are where the polyhedron's own begin and where the coefficients begin, the box's origin, axes
 (rows), center and half, the tree, the coefficients piece by piece, and the polyhedron's parameters.
