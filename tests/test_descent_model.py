@@ -157,7 +157,7 @@ def measured_arc(p: Problem) -> tuple[Any, np.ndarray, np.ndarray]:
         p.case.final_stage_s,
         p.case.asteroid.rotation_rate_rad_s,
         craft.exhaust_velocity_m_s,
-        int(field.kind),
+        field.kind,
         field.params,
         points,
     )

@@ -38,7 +38,7 @@ def measured(state: np.ndarray) -> tuple[ArcMeasures, np.ndarray]:
     points = np.zeros((ARC_SAMPLES + 1, 3))
     field = BODY.gravity
     arc = measure_arc(
-        state, MASS_KG, TARGET, NORMAL, T, SPIN[2], EXHAUST_M_S, int(field.kind), field.params, points
+        state, MASS_KG, TARGET, NORMAL, T, SPIN[2], EXHAUST_M_S, field.kind, field.params, points
     )
     return arc, points
 

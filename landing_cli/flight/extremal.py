@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernel_types import VectorAndSymmetric
 from landing_cli.body.gravity.kernels import acceleration_and_gradient
 from landing_cli.kernel import kernel
@@ -150,7 +151,12 @@ def rates_in_gravity(
 
 @kernel
 def extremal_rates(
-    kind: int, params: FloatArray, scale: ExtremalScale, saturated: bool, y: FloatArray, out: FloatArray
+    kind: GravityKind,
+    params: FloatArray,
+    scale: ExtremalScale,
+    saturated: bool,
+    y: FloatArray,
+    out: FloatArray,
 ) -> None:
     """Write the rates of ``rates_in_gravity`` in a gravity field (kind, params)."""
     length = scale.length_m

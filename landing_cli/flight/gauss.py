@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.flight.dynamics import natural_acceleration
 from landing_cli.flight.extremal import ExtremalScale, extremal_rates, scaled_thrust, thrust_ratio
 from landing_cli.kernel import kernel
@@ -37,7 +38,7 @@ _GAUSS_BA = GAUSS_B @ GAUSS_A
 
 @kernel
 def fly_sampled(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     w: float,
     ve: float,
@@ -50,7 +51,7 @@ def fly_sampled(
 
     Parameters
     ----------
-    kind : int
+    kind : GravityKind
         Gravity model to fly in.
     params : (p,) float, SI
         Parameters of the gravity model.
@@ -135,7 +136,7 @@ def _stage_masses(
 
 @kernel
 def _extremal_step(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     scale: ExtremalScale,
     saturated: bool,
@@ -184,7 +185,7 @@ def _first_crossing(scale: ExtremalScale, saturated: bool, stages: FloatArray, o
 
 @kernel
 def sample_extremal(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     scale: ExtremalScale,
     y: FloatArray,
@@ -197,8 +198,8 @@ def sample_extremal(
 
     Parameters
     ----------
-    kind : int
-        Gravity model, a ``GravityKind``.
+    kind : GravityKind
+        Gravity model to fly in.
     params : (p,) float, SI
         Parameters of the gravity model.
     scale : ExtremalScale
@@ -246,7 +247,7 @@ def sample_extremal(
 
 @kernel
 def _to_the_kink(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     scale: ExtremalScale,
     saturated: bool,

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration_and_gradient
 from landing_cli.flight.legs import BezierLeg
 from landing_cli.kernel import kernel
@@ -32,7 +33,7 @@ class FlownCurve(NamedTuple):
     ----------
     points : (4, n + 1, 3) float, m/s^k
         Row k: control points of the k-th time derivative; those beyond its degree are zero.
-    kind : int
+    kind : GravityKind
     params : (p,) float, SI
         Gravity model.
     w : float, rad/s
@@ -43,7 +44,7 @@ class FlownCurve(NamedTuple):
     """
 
     points: FloatArray
-    kind: int
+    kind: GravityKind
     params: FloatArray
     w: float
     exhaust_velocity: float
@@ -73,7 +74,7 @@ def flown_curve(leg: BezierLeg, rotation_rate_rad_s: float, exhaust_velocity_m_s
         points[k, : degree + 1 - k] = scale * np.diff(leg.points_m, k, axis=0)
     field = leg.gravity
     return FlownCurve(
-        points, int(field.kind), field.params, rotation_rate_rad_s, exhaust_velocity_m_s, leg.duration_s
+        points, field.kind, field.params, rotation_rate_rad_s, exhaust_velocity_m_s, leg.duration_s
     )
 
 

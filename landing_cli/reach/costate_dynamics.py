@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration_and_gradient, curvature
 from landing_cli.flight.extremal import ExtremalScale, rates_in_gravity, thrust_ratio
 from landing_cli.kernel import inlined, kernel
@@ -43,7 +44,7 @@ class Extremal(NamedTuple):
 class Field(NamedTuple):
     """Gravity and scales of a descent."""
 
-    kind: int
+    kind: GravityKind
     params: Floats
     scale: ExtremalScale
     inverse_axes: Floats  # (3,) of the keep-out ellipsoid, scaled

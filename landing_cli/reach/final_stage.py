@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration
 from landing_cli.kernel import kernel
 
@@ -96,7 +97,7 @@ def measure_arc(
     duration_s: float,
     spin: float,
     exhaust_velocity: float,
-    kind: int,
+    kind: GravityKind,
     params: Floats,
     points: Floats,
 ) -> ArcMeasures:
@@ -112,7 +113,7 @@ def measure_arc(
         Touchdown point (m) and outward unit normal of its facet.
     duration_s, spin, exhaust_velocity : float, s, rad/s, m/s
         Final stage's duration, spin rate, effective exhaust velocity.
-    kind, params : int, (p,) float
+    kind, params : GravityKind, (p,) float
         The gravity field.
     points : (ARC_SAMPLES + 1, 3) float
         Filled with positions from the handover to touchdown, m.

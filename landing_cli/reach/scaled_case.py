@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration, acceleration_and_gradient
 from landing_cli.kernel import kernel
 from landing_cli.kernel_record import by_reference
@@ -46,7 +47,7 @@ class ScaledCase(NamedTuple):
     arc_share: float  # share of the thrust bound that the final stage may use
     compensated: bool
     on_ellipsoid: bool
-    gravity_kind: int
+    gravity_kind: GravityKind
     gravity_params: Floats
     length_m: float
     acceleration_m_s2: float
@@ -85,7 +86,7 @@ def scale_case(case: LandingCase, n_intervals: int) -> ScaledCase:
         arc_share=1.0,
         compensated=case.final_stage_thrust == "compensated",
         on_ellipsoid=case.handover == "on_ellipsoid",
-        gravity_kind=int(case.asteroid.gravity.kind),
+        gravity_kind=case.asteroid.gravity.kind,
         gravity_params=case.asteroid.gravity.params.copy(),  # writable, as it comes out of a pickle
         length_m=length,
         acceleration_m_s2=a0,

@@ -30,7 +30,7 @@ def bennu_field() -> GravityField:
 def fly(field: GravityField, start: np.ndarray, duration: float, nodes: np.ndarray, steps: int) -> np.ndarray:
     states = np.zeros((len(nodes) * steps + 1, 7))
     states[0] = start
-    fly_nodes(int(field.kind), field.params, SPIN, EXHAUST, duration, nodes, steps, states)
+    fly_nodes(field.kind, field.params, SPIN, EXHAUST, duration, nodes, steps, states)
     return states
 
 
@@ -100,8 +100,8 @@ def test_inertial_thrust_pushes_along_a_line_that_is_fixed_at_the_end_of_the_leg
 def test_natural_acceleration_is_gravity_minus_coriolis_minus_centrifugal() -> None:
     field = bennu_field()
     r, v, w = np.array([210.0, -90.0, 260.0]), np.array([0.4, -0.2, 0.7]), np.array([0.0, 0.0, SPIN])
-    still = np.array(natural_acceleration(int(field.kind), field.params, 0.0, *r, *v))
-    got = np.array(natural_acceleration(int(field.kind), field.params, SPIN, *r, *v))
+    still = np.array(natural_acceleration(field.kind, field.params, 0.0, *r, *v))
+    got = np.array(natural_acceleration(field.kind, field.params, SPIN, *r, *v))
     fictitious = -2.0 * np.cross(w, v) - np.cross(w, np.cross(w, r))
     assert_allclose(got, still + fictitious, rtol=1e-14)
 

@@ -93,7 +93,7 @@ def shot_energy(case: ObserveCase, path: Path, count: int) -> float:
 
     def rates(t: float, y: np.ndarray) -> np.ndarray:
         r = y[:3] * length + frame.origin_m
-        gx, gy, gz, xx, yy, zz, xy, xz, yz = acceleration_and_gradient(int(field.kind), field.params, *r)
+        gx, gy, gz, xx, yy, zz, xy, xz, yz = acceleration_and_gradient(field.kind, field.params, *r)
         slope = TOF**2 * np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) + centrifugal
         u = -0.5 * y[9:12]
         a = np.array([gx, gy, gz]) * TOF**2 / length + centrifugal @ r / length + coriolis @ y[3:6] + u

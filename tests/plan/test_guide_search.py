@@ -118,7 +118,7 @@ def test_departure_of_the_polyhedron_is_small_where_it_is_interpolated():
     exact, peak = np.zeros(clear.size), np.zeros(clear.size)
     field = case.asteroid.gravity
     none = np.zeros((0, 3, clear.size))
-    fill_costs(int(field.kind), field.params, search.curves, none, alpha, beta, np.inf, exact, peak)
+    fill_costs(field.kind, field.params, search.curves, none, alpha, beta, np.inf, exact, peak)
     np.testing.assert_allclose(candidates.delta_v_m_s[clear], exact, rtol=7e-4)
     np.testing.assert_allclose(candidates.peak_m_s2[clear], peak, rtol=1e-4)
     rough = price(search, shares, shares, departs=False)

@@ -136,7 +136,7 @@ def _bound_on_surface(
     while True:
         directions, angles = _centres(triangles)
         sizes, ceilings, reaches = np.zeros((3, len(triangles)))
-        _fill_ceilings(int(field.kind), params, directions, semi_axes, angles, sizes, ceilings, reaches)
+        _fill_ceilings(field.kind, params, directions, semi_axes, angles, sizes, ceilings, reaches)
         points = directions * semi_axes
         attained = max(attained, sizes[region.holds(points, 0.0)].max(initial=0.0))
         open_patches = (ceilings > (1.0 + TOLERANCE) * attained) & region.holds(points, reaches)
@@ -207,7 +207,7 @@ def _stretch2(u: Vector, semi_axes: FloatArray) -> float:
 
 @kernel
 def _fill_ceilings(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     directions: FloatArray,
     semi_axes: FloatArray,

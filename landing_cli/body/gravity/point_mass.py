@@ -8,7 +8,7 @@ import numpy as np
 
 from landing_cli.body.gravity.checks import checked_gm
 from landing_cli.body.gravity.field import GravityField, GravityKind
-from landing_cli.body.gravity.kernel_types import Symmetric, Vector, VectorAndSymmetric
+from landing_cli.body.gravity.kernel_types import Params, Symmetric, Vector, VectorAndSymmetric
 from landing_cli.kernel import kernel
 
 
@@ -82,3 +82,29 @@ def point_curvature(gm: float, x: float, y: float, z: float, lx: float, ly: floa
         s * (x * lz + lx * z) + c * x * z,
         s * (y * lz + ly * z) + c * y * z,
     )
+
+
+@kernel
+def point_mass_potential(params: Params, x: float, y: float, z: float) -> float:
+    """Return U."""
+    return point_potential(params[0], x, y, z)
+
+
+@kernel
+def point_mass_acceleration(params: Params, x: float, y: float, z: float) -> Vector:
+    """Return the gradient of U."""
+    return point_acceleration(params[0], x, y, z)
+
+
+@kernel
+def point_mass_acceleration_and_gradient(params: Params, x: float, y: float, z: float) -> VectorAndSymmetric:
+    """Return the gradient and the Hessian (xx, yy, zz, xy, xz, yz) of U."""
+    return point_acceleration_and_gradient(params[0], x, y, z)
+
+
+@kernel
+def point_mass_curvature(
+    params: Params, x: float, y: float, z: float, lx: float, ly: float, lz: float
+) -> Symmetric:
+    """Return the derivative of the Hessian of U along (lx, ly, lz)."""
+    return point_curvature(params[0], x, y, z, lx, ly, lz)
