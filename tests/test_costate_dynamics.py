@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from numpy.testing import assert_allclose
 
 from landing_cli.body.gravity.harmonics import harmonics_field
@@ -18,10 +19,20 @@ from landing_cli.reach.costate_dynamics import (
     STATE,
     Extremal,
     Field,
-    fly_extremal,
-    new_extremal,
-    tangents,
 )
+from landing_cli.reach.costate_dynamics import (
+    fly_extremal as fly_extremal_part,
+)
+from landing_cli.reach.costate_dynamics import (
+    new_extremal as new_extremal_part,
+)
+from landing_cli.reach.costate_dynamics import (
+    tangents as tangents_part,
+)
+
+fly_extremal = from_python(fly_extremal_part)
+new_extremal = from_python(new_extremal_part)
+tangents = from_python(tangents_part)
 
 SPIN = 2.0 * np.pi / (4.288 * 3600.0)
 EXHAUST = 400.0 * 9.80665

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from landing_samples import landing_case
 from numpy.testing import assert_allclose
 
@@ -16,11 +17,20 @@ from landing_cli.reach.costate_dynamics import (
     COLUMNS,
     MAX_SPLITS,
     STATE,
-    fly_extremal,
-    new_extremal,
-    tangents,
 )
-from landing_cli.reach.ellipsoid_dips import LEVEL, dip_row, find_dips, new_dips
+from landing_cli.reach.costate_dynamics import (
+    fly_extremal as fly_extremal_part,
+)
+from landing_cli.reach.costate_dynamics import (
+    new_extremal as new_extremal_part,
+)
+from landing_cli.reach.costate_dynamics import (
+    tangents as tangents_part,
+)
+from landing_cli.reach.ellipsoid_dips import LEVEL
+from landing_cli.reach.ellipsoid_dips import dip_row as dip_row_part
+from landing_cli.reach.ellipsoid_dips import find_dips as find_dips_part
+from landing_cli.reach.ellipsoid_dips import new_dips as new_dips_part
 from landing_cli.reach.extremal_terms import (
     MAX_ROWS,
     N_ARC,
@@ -30,11 +40,30 @@ from landing_cli.reach.extremal_terms import (
     ROW_PROPELLANT,
     ExtremalProblem,
     extremal_problem,
-    final_energy,
-    handover_hessian,
-    handover_rows,
-    with_guard,
 )
+from landing_cli.reach.extremal_terms import (
+    final_energy as final_energy_part,
+)
+from landing_cli.reach.extremal_terms import (
+    handover_hessian as handover_hessian_part,
+)
+from landing_cli.reach.extremal_terms import (
+    handover_rows as handover_rows_part,
+)
+from landing_cli.reach.extremal_terms import (
+    with_guard as with_guard_part,
+)
+
+dip_row = from_python(dip_row_part)
+final_energy = from_python(final_energy_part)
+find_dips = from_python(find_dips_part)
+fly_extremal = from_python(fly_extremal_part)
+handover_hessian = from_python(handover_hessian_part)
+handover_rows = from_python(handover_rows_part)
+new_dips = from_python(new_dips_part)
+new_extremal = from_python(new_extremal_part)
+tangents = from_python(tangents_part)
+with_guard = from_python(with_guard_part)
 
 TARGET_M, NORMAL = np.array([120.0, 60.0, 210.0]), np.array([0.36, 0.48, 0.8])
 HANDOVER = (np.array([170.0, 110.0, 300.0]), np.array([-0.4, -0.2, -0.9]), 0.998)

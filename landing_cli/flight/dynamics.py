@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.kernels import acceleration, potential
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def natural_acceleration(
     return gx + w * (2.0 * vy + w * x), gy + w * (-2.0 * vx + w * y), gz
 
 
-@kernel
+@part
 def rk4_step(
     kind: GravityKind,
     params: FloatArray,
@@ -113,7 +113,7 @@ def turn(angle: float, vector: FloatArray, out: FloatArray) -> None:
     out[0], out[1], out[2] = c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2]
 
 
-@kernel
+@part
 def fly_nodes(
     kind: GravityKind,
     params: FloatArray,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from landing_cli.body.gravity.field import GravityKind
 from landing_cli.flight.dynamics import natural_acceleration
 from landing_cli.flight.extremal import ExtremalScale, extremal_rates, scaled_thrust, thrust_ratio
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 
@@ -116,7 +116,7 @@ def fly_sampled(
     return worst
 
 
-@kernel
+@part
 def _stage_masses(
     h: float, ve: float, m: float, control: FloatArray, per_mass: bool, mass: FloatArray
 ) -> float:
@@ -134,7 +134,7 @@ def _stage_masses(
     return m * math.exp(-total) if per_mass else m - total
 
 
-@kernel
+@part
 def _extremal_step(
     kind: GravityKind,
     params: FloatArray,
@@ -172,7 +172,7 @@ def _extremal_step(
             out[a] += h * GAUSS_B[j] * K[j, a]
 
 
-@kernel
+@part
 def _first_crossing(scale: ExtremalScale, saturated: bool, stages: FloatArray, out: FloatArray) -> float:
     """Return the fraction of the step by which the switching function has crossed 1; 2 if it has not."""
     for i in range(STAGES):
@@ -245,7 +245,7 @@ def sample_extremal(
     return k
 
 
-@kernel
+@part
 def _to_the_kink(
     kind: GravityKind,
     params: FloatArray,

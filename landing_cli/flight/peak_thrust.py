@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration_and_gradient
 from landing_cli.flight.legs import BezierLeg
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 
@@ -101,7 +101,7 @@ def peak_acceleration(
     return value, tau * leg.duration_s
 
 
-@kernel
+@part
 def bezier_point(points: FloatArray, degree: int, tau: float) -> tuple[float, float, float]:
     """Point of a Bezier curve, by Horner's rule in tau / (1 - tau), or its reverse beyond the middle.
 
@@ -130,7 +130,7 @@ def bezier_point(points: FloatArray, degree: int, tau: float) -> tuple[float, fl
     return scale * x, scale * y, scale * z
 
 
-@kernel
+@part
 def thrust_slope(curve: FlownCurve, tau: float) -> tuple[float, float]:
     """Thrust acceleration, and a number of the sign of the thrust's rate.
 
@@ -163,7 +163,7 @@ def thrust_slope(curve: FlownCurve, tau: float) -> tuple[float, float]:
     return size, ux * sx + uy * sy + uz * sz - size**3 / curve.exhaust_velocity
 
 
-@kernel
+@part
 def _burnt(curve: FlownCurve, h: float, u: float, slope: float, after: float, next_slope: float) -> float:
     """Velocity increment over a share h of the curve: trapezoidal, corrected by the rates at its ends.
 

@@ -18,7 +18,7 @@ from landing_cli.body.gravity.kernels import acceleration
 from landing_cli.body.gravity.models import number_of
 from landing_cli.body.gravity.point_mass import point_acceleration
 from landing_cli.flight.bezier_curve import bezier_basis, first_control_points, last_control_points
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 from landing_cli.plan.guide_points import DEGREE, GuidePlane
 from landing_cli.plan.records import PlanCase
 
@@ -183,7 +183,7 @@ def fill_costs(
                 peak[j] = max(peak[j], before[j])
 
 
-@kernel
+@part
 def _fill_pull(
     kind: GravityKind,
     params: FloatArray,
@@ -210,7 +210,7 @@ def _fill_pull(
             pull[0, j], pull[1, j], pull[2, j] = acceleration(kind, params, x, y, z)
 
 
-@kernel
+@part
 def fill_path(position: FloatArray, alpha: float, beta: float, path: FloatArray) -> None:
     """Write the positions of one curve of a family.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from numpy.testing import assert_allclose
 
 from landing_cli.body.gravity.field import GravityField
@@ -11,12 +12,16 @@ from landing_cli.body.gravity.harmonics import harmonics_field
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.flight.dynamics import (
     about_z,
-    fly_nodes,
     jacobi_constant,
     natural_acceleration,
     to_inertial,
     to_rotating,
 )
+from landing_cli.flight.dynamics import (
+    fly_nodes as fly_nodes_part,
+)
+
+fly_nodes = from_python(fly_nodes_part)
 
 GM = 4.892  # Bennu, m3/s2
 SPIN = 2.0 * np.pi / (4.288 * 3600.0)  # rad/s

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from scipy.integrate import solve_ivp
 from solver_samples import INNER_M, eros_case, miss_m, potato_case, reflown
 
-from landing_cli.body.gravity.kernels import acceleration_and_gradient
+from landing_cli.body.gravity.kernels import acceleration_and_gradient as acceleration_and_gradient_part
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.flight.linear_arcs import fly_linear_arcs
 from landing_cli.flight.linearised_arcs import linearised_arcs
@@ -26,6 +27,8 @@ from landing_cli.observe.path_values import control_energy
 from landing_cli.observe.records import ObserveCase, SteeringOptions
 from landing_cli.observe.transcription import least_energy_path
 from landing_cli.observe.waypoints import waypoints_of
+
+acceleration_and_gradient = from_python(acceleration_and_gradient_part)
 
 TOF = 800.0
 

@@ -19,7 +19,7 @@ from landing_cli.body.gravity.kernel_types import FloatArray, Vector
 from landing_cli.body.gravity.kernels import acceleration_and_gradient, curvature
 from landing_cli.body.gravity.polyhedron_records import recorded_corners
 from landing_cli.errors import InputRefused
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 TOLERANCE = 0.005  # how far a bound may lie above the largest value met
 _SECOND_ORDER_MARGIN = 2.0  # covers the change of the second derivative within a patch
@@ -192,7 +192,7 @@ def _unit(vectors: FloatArray) -> FloatArray:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
-@kernel
+@part
 def _stretch2(u: Vector, semi_axes: FloatArray) -> float:
     """Return the largest |D t|^2 over unit tangents t at u, D = diag(semi_axes).
 

@@ -13,7 +13,7 @@ from landing_cli.body.gravity.polyhedron import (
     polyhedron_curvature,
     polyhedron_potential,
 )
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 DEGREE = 10
 PER_PIECE = (DEGREE + 1) * (DEGREE + 2) * (DEGREE + 3) // 6
@@ -24,7 +24,7 @@ _ROUNDING = 1e-9  # of the box: how far outside a point still counts as on its f
 Fitted = tuple[bool, float, float, float, float, float, float, float, float, float, float]
 
 
-@kernel
+@part
 def _fitted_values(params: Params, x: float, y: float, z: float) -> Fitted:
     """Return whether a piece holds the point, then U, g and its gradient (xx, yy, zz, xy, xz, yz)."""
     nothing = (False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -12,7 +12,7 @@ from typing import Any
 from landing_cli.body.gravity import models
 from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernel_types import Params, Symmetric, Vector, VectorAndSymmetric
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 _potential: Any = models.called(models.POTENTIAL)
 _acceleration: Any = models.called(models.ACCELERATION)
@@ -32,7 +32,7 @@ def acceleration(kind: GravityKind, params: Params, x: float, y: float, z: float
     return _acceleration(kind, params, x, y, z)
 
 
-@kernel
+@part
 def acceleration_and_gradient(
     kind: GravityKind, params: Params, x: float, y: float, z: float
 ) -> VectorAndSymmetric:
