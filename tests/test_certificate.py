@@ -14,11 +14,7 @@ from landing_cli.optimize.conic_records import Model, new_model
 from landing_cli.reach.certificate import certified_thrust_level, gravity_bounds, gravity_tube
 from landing_cli.reach.descent_model import (
     fill_arc_cones as fill_arc_cones_part,
-)
-from landing_cli.reach.descent_model import (
     fill_glide_cones as fill_glide_cones_part,
-)
-from landing_cli.reach.descent_model import (
     fill_handover_rows as fill_handover_rows_part,
 )
 from landing_cli.reach.free_descent import PreparedCase, prepare, solve_prepared, survey

@@ -17,10 +17,8 @@ from landing_cli.body.clearance import (
     closest_facets,
     contains,
     path_clearance,
-    signed_distances,
-)
-from landing_cli.body.clearance import (
     signed_distance as signed_distance_part,
+    signed_distances,
 )
 from landing_cli.body.mesh import Mesh, facet_areas, facet_centroids, facet_normals
 from landing_cli.errors import InputRefused

@@ -7,8 +7,12 @@ import pytest
 from conic_oracles import ByClarabel, DenseNewton, Sizes, copy_of, iterate, rows_on_thrust
 from kernel_calls import from_python
 
-from landing_cli.optimize.conic_ipm import FRACTION_TO_BOUNDARY, advance, residuals
-from landing_cli.optimize.conic_ipm import fill_row_pull as fill_row_pull_part
+from landing_cli.optimize.conic_ipm import (
+    FRACTION_TO_BOUNDARY,
+    advance,
+    fill_row_pull as fill_row_pull_part,
+    residuals,
+)
 from landing_cli.optimize.conic_records import Model, Point, Step, new_model, new_point, new_step
 
 fill_row_pull = from_python(fill_row_pull_part)

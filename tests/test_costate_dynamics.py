@@ -19,14 +19,8 @@ from landing_cli.reach.costate_dynamics import (
     STATE,
     Extremal,
     Field,
-)
-from landing_cli.reach.costate_dynamics import (
     fly_extremal as fly_extremal_part,
-)
-from landing_cli.reach.costate_dynamics import (
     new_extremal as new_extremal_part,
-)
-from landing_cli.reach.costate_dynamics import (
     tangents as tangents_part,
 )
 

@@ -16,24 +16,15 @@ from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.optimize.conic_records import Model, Point, new_model, new_point
 from landing_cli.reach.descent_model import (
     Layout,
+    fill_arc_cones as fill_arc_cones_part,
+    fill_glide_cones as fill_glide_cones_part,
+    fill_handover_rows as fill_handover_rows_part,
     layout,
     refresh,
 )
-from landing_cli.reach.descent_model import (
-    fill_arc_cones as fill_arc_cones_part,
-)
-from landing_cli.reach.descent_model import (
-    fill_glide_cones as fill_glide_cones_part,
-)
-from landing_cli.reach.descent_model import (
-    fill_handover_rows as fill_handover_rows_part,
-)
-from landing_cli.reach.final_stage import ARC_SAMPLES
-from landing_cli.reach.final_stage import measure_arc as measure_arc_part
-from landing_cli.reach.planes import Cuts, new_cuts
-from landing_cli.reach.planes import arc_weights as arc_weights_part
-from landing_cli.reach.scaled_case import ScaledCase, scale_case
-from landing_cli.reach.scaled_case import ellipsoid_level as ellipsoid_level_part
+from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc as measure_arc_part
+from landing_cli.reach.planes import Cuts, arc_weights as arc_weights_part, new_cuts
+from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level as ellipsoid_level_part, scale_case
 from landing_cli.reach.shooting import Path, new_path
 
 arc_weights = from_python(arc_weights_part)

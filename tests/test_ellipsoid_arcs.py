@@ -8,18 +8,18 @@ from landing_samples import asteroid, landing_case
 from landing_cli.reach.ellipsoid_arcs import (
     arc_cuts,
     freeze_on_path,
+    last_cut_node as last_cut_node_part,
     lowest_level,
     lowest_level_between,
 )
-from landing_cli.reach.ellipsoid_arcs import (
-    last_cut_node as last_cut_node_part,
-)
 from landing_cli.reach.records import LandingCase
-from landing_cli.reach.scaled_case import ScaledCase, scale_case
-from landing_cli.reach.scaled_case import ellipsoid_level as ellipsoid_level_part
-from landing_cli.reach.scaled_case import ellipsoid_normal as ellipsoid_normal_part
-from landing_cli.reach.shooting import SUBSTEPS
-from landing_cli.reach.shooting import fly_accurately as fly_accurately_part
+from landing_cli.reach.scaled_case import (
+    ScaledCase,
+    ellipsoid_level as ellipsoid_level_part,
+    ellipsoid_normal as ellipsoid_normal_part,
+    scale_case,
+)
+from landing_cli.reach.shooting import SUBSTEPS, fly_accurately as fly_accurately_part
 
 ellipsoid_level = from_python(ellipsoid_level_part)
 ellipsoid_normal = from_python(ellipsoid_normal_part)

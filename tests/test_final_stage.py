@@ -10,10 +10,13 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
 from landing_cli.body.gravity.field_values import accelerations
-from landing_cli.reach.final_stage import ARC_SAMPLES, ArcMeasures
-from landing_cli.reach.final_stage import arc_state as arc_state_part
-from landing_cli.reach.final_stage import end_accelerations as end_accelerations_part
-from landing_cli.reach.final_stage import measure_arc as measure_arc_part
+from landing_cli.reach.final_stage import (
+    ARC_SAMPLES,
+    ArcMeasures,
+    arc_state as arc_state_part,
+    end_accelerations as end_accelerations_part,
+    measure_arc as measure_arc_part,
+)
 
 arc_state = from_python(arc_state_part)
 end_accelerations = from_python(end_accelerations_part)

@@ -15,8 +15,7 @@ from landing_cli.reach.descent_model import Layout, layout, refresh
 from landing_cli.reach.free_solve import Solver, cold_start
 from landing_cli.reach.planes import new_cuts
 from landing_cli.reach.records import LandingCase
-from landing_cli.reach.scaled_case import ScaledCase, scale_case
-from landing_cli.reach.scaled_case import ellipsoid_normal as ellipsoid_normal_part
+from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal as ellipsoid_normal_part, scale_case
 from landing_cli.reach.shooting import new_path
 
 ellipsoid_normal = from_python(ellipsoid_normal_part)

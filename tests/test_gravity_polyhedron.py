@@ -14,9 +14,11 @@ from kernel_calls import from_python
 from shape_helpers import box
 
 from landing_cli.body.gravity.field_values import accelerations, gradients, potentials
-from landing_cli.body.gravity.polyhedron import inside_share as inside_share_part
-from landing_cli.body.gravity.polyhedron import laplacian as laplacian_part
-from landing_cli.body.gravity.polyhedron import polyhedron_field
+from landing_cli.body.gravity.polyhedron import (
+    inside_share as inside_share_part,
+    laplacian as laplacian_part,
+    polyhedron_field,
+)
 from landing_cli.body.mesh import Mesh
 from landing_cli.errors import InputRefused
 

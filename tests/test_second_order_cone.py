@@ -6,23 +6,11 @@ from kernel_calls import from_python
 
 from landing_cli.optimize.second_order_cone import (
     UNBOUNDED,
-)
-from landing_cli.optimize.second_order_cone import (
     apply_inverse_scaling as apply_inverse_scaling_part,
-)
-from landing_cli.optimize.second_order_cone import (
     apply_inverse_scaling_squared as apply_inverse_scaling_squared_part,
-)
-from landing_cli.optimize.second_order_cone import (
     apply_scaling as apply_scaling_part,
-)
-from landing_cli.optimize.second_order_cone import (
     complementarity_shift as complementarity_shift_part,
-)
-from landing_cli.optimize.second_order_cone import (
     longest_step as longest_step_part,
-)
-from landing_cli.optimize.second_order_cone import (
     scaling_point as scaling_point_part,
 )
 

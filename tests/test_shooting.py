@@ -11,10 +11,14 @@ from landing_cli.body.gravity.field_values import gradients
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
-from landing_cli.reach.shooting import Path, fly, new_path
-from landing_cli.reach.shooting import fly_accurately as fly_accurately_part
-from landing_cli.reach.shooting import measure_defect as measure_defect_part
-from landing_cli.reach.shooting import pull_back as pull_back_part
+from landing_cli.reach.shooting import (
+    Path,
+    fly,
+    fly_accurately as fly_accurately_part,
+    measure_defect as measure_defect_part,
+    new_path,
+    pull_back as pull_back_part,
+)
 
 fly_accurately = from_python(fly_accurately_part)
 measure_defect = from_python(measure_defect_part)

@@ -9,27 +9,24 @@ import numpy as np
 import pytest
 from kernel_calls import from_python
 from landing_samples import asteroid, landing_case
-from truth.tables import landing_case as true_case
-from truth.tables import read_table
+from truth.tables import landing_case as true_case, read_table
 
 from landing_cli.optimize.conic_records import new_model
 from landing_cli.reach import sides
 from landing_cli.reach.certificate import certified_thrust_level
 from landing_cli.reach.descent_model import (
     fill_arc_cones as fill_arc_cones_part,
-)
-from landing_cli.reach.descent_model import (
     fill_glide_cones as fill_glide_cones_part,
-)
-from landing_cli.reach.descent_model import (
     fill_handover_rows as fill_handover_rows_part,
 )
 from landing_cli.reach.free_descent import PreparedCase, prepare, solve_prepared, survey
 from landing_cli.reach.margin import least_thrust_flights
 from landing_cli.reach.planes import Cuts
 from landing_cli.reach.records import Binding, Verdict
-from landing_cli.reach.scaled_case import ellipsoid_level as ellipsoid_level_part
-from landing_cli.reach.scaled_case import ellipsoid_normal as ellipsoid_normal_part
+from landing_cli.reach.scaled_case import (
+    ellipsoid_level as ellipsoid_level_part,
+    ellipsoid_normal as ellipsoid_normal_part,
+)
 
 ellipsoid_level = from_python(ellipsoid_level_part)
 ellipsoid_normal = from_python(ellipsoid_normal_part)

@@ -5,9 +5,11 @@ import pytest
 import scipy.linalg
 from kernel_calls import from_python
 
-from landing_cli.optimize.small_dense import SMALLEST_PIVOT
-from landing_cli.optimize.small_dense import cholesky as cholesky_part
-from landing_cli.optimize.small_dense import cholesky_solve as cholesky_solve_part
+from landing_cli.optimize.small_dense import (
+    SMALLEST_PIVOT,
+    cholesky as cholesky_part,
+    cholesky_solve as cholesky_solve_part,
+)
 
 cholesky = from_python(cholesky_part)
 cholesky_solve = from_python(cholesky_solve_part)

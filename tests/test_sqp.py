@@ -9,19 +9,11 @@ from numpy.testing import assert_allclose
 
 from landing_cli.optimize.sqp import (
     LocalModel,
-    violation,
-)
-from landing_cli.optimize.sqp import (
     add_secant as add_secant_part,
-)
-from landing_cli.optimize.sqp import (
     convexify as convexify_part,
-)
-from landing_cli.optimize.sqp import (
     new_local_model as new_local_model_part,
-)
-from landing_cli.optimize.sqp import (
     propose as propose_part,
+    violation,
 )
 
 add_secant = from_python(add_secant_part)

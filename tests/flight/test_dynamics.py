@@ -12,13 +12,11 @@ from landing_cli.body.gravity.harmonics import harmonics_field
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.flight.dynamics import (
     about_z,
+    fly_nodes as fly_nodes_part,
     jacobi_constant,
     natural_acceleration,
     to_inertial,
     to_rotating,
-)
-from landing_cli.flight.dynamics import (
-    fly_nodes as fly_nodes_part,
 )
 
 fly_nodes = from_python(fly_nodes_part)

@@ -17,9 +17,14 @@ from landing_cli.plan.bezier import plan_bezier
 from landing_cli.plan.curve_family import fill_costs
 from landing_cli.plan.grid_search import best_kept, search_guide_points, two_level_search
 from landing_cli.plan.guide_candidates import clearances, curve_of, prepare_search, price
-from landing_cli.plan.path_check import CUTS, KEPT, TOO_CLOSE, least_distance
-from landing_cli.plan.path_check import check_path as check_path_part
-from landing_cli.plan.path_check import cone_entry as cone_entry_part
+from landing_cli.plan.path_check import (
+    CUTS,
+    KEPT,
+    TOO_CLOSE,
+    check_path as check_path_part,
+    cone_entry as cone_entry_part,
+    least_distance,
+)
 from landing_cli.plan.records import BezierOptions
 from landing_cli.plan.shortest_time import RESOLUTION_S, plan_shortest_time, rule_time
 

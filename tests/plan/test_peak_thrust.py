@@ -12,9 +12,12 @@ from planning_samples import lumpy_case
 from landing_cli.flight.acceleration_control import thrust_accelerations
 from landing_cli.flight.bezier_curve import curve_states
 from landing_cli.flight.legs import BezierLeg
-from landing_cli.flight.peak_thrust import bezier_point as bezier_point_part
-from landing_cli.flight.peak_thrust import flown_curve, peak_acceleration
-from landing_cli.flight.peak_thrust import thrust_slope as thrust_slope_part
+from landing_cli.flight.peak_thrust import (
+    bezier_point as bezier_point_part,
+    flown_curve,
+    peak_acceleration,
+    thrust_slope as thrust_slope_part,
+)
 from landing_cli.plan.guide_candidates import curve_of, prepare_search
 from landing_cli.plan.records import BezierOptions
 

@@ -23,8 +23,7 @@ from landing_cli.parallel import LostChunk, WorkPlan, run_chunks
 from landing_cli.tour import layered_search
 from landing_cli.tour.beam import Chains, extended, improved, scratch_for
 from landing_cli.tour.beam_search import FINAL_ROUNDS, choose, first_level, search, serial
-from landing_cli.tour.chain_kernel import LEG_COLUMNS
-from landing_cli.tour.chain_kernel import chain_cost as chain_cost_part
+from landing_cli.tour.chain_kernel import LEG_COLUMNS, chain_cost as chain_cost_part
 from landing_cli.tour.first_level import carrier, shot
 from landing_cli.tour.layered_search import preferred
 from landing_cli.tour.records import LayeredOptions, SearchOutcome

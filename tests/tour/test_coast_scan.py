@@ -10,8 +10,7 @@ from kernel_calls import from_python
 
 from landing_cli.flight.astronomy import AU_M, DAY_S, GM_SUN_M3_S2
 from landing_cli.flight.kepler import propagate_kepler
-from landing_cli.tour.coast_scan import FASTEST_M_S, Coasts, scan_targets
-from landing_cli.tour.coast_scan import coast_from as coast_from_part
+from landing_cli.tour.coast_scan import FASTEST_M_S, Coasts, coast_from as coast_from_part, scan_targets
 
 coast_from = from_python(coast_from_part)
 

@@ -18,11 +18,9 @@ from landing_cli.tour.ephemeris import (
     BODIES,
     GM_M3_S2,
     Ephemeris,
+    body_positions as body_positions_part,
     flight_ephemeris,
     states_of_body,
-)
-from landing_cli.tour.ephemeris import (
-    body_positions as body_positions_part,
 )
 
 body_positions = from_python(body_positions_part)

@@ -16,8 +16,7 @@ from landing_cli.flight.elements import (
     states_at,
     states_of,
 )
-from landing_cli.flight.kepler import propagate_kepler
-from landing_cli.flight.kepler import stumpff_g as stumpff_g_part
+from landing_cli.flight.kepler import propagate_kepler, stumpff_g as stumpff_g_part
 
 stumpff_g = from_python(stumpff_g_part)
 
