@@ -16,8 +16,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from landing_cli.body.adjacency import mean_edge_m
 from landing_cli.body.bvh import build_surface_index
-from landing_cli.body.clearance import TOUCHDOWN_TOLERANCE_M as TOLERANCE
-from landing_cli.body.clearance import path_clearance, signed_distances
+from landing_cli.body.clearance import TOUCHDOWN_TOLERANCE_M as TOLERANCE, path_clearance, signed_distances
 from landing_cli.body.mesh import Mesh, facet_centroids
 
 POINTS = 200

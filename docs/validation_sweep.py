@@ -26,8 +26,7 @@ from landing_cli.studies.rank.figures import rank_figure
 from landing_cli.studies.rank.measures import roughness_m, slopes_deg
 from landing_cli.studies.rank.score import Ranking, Wishes, check_weights, rank_sites
 from landing_cli.studies.sweep.grid_pages import Quantity, grid_figures
-from landing_cli.studies.sweep.pipeline import RunOptions, grid_of
-from landing_cli.studies.sweep.pipeline import run as run_sweep
+from landing_cli.studies.sweep.pipeline import RunOptions, grid_of, run as run_sweep
 from landing_cli.studies.sweep.records import SweepRun, kept_columns
 from landing_cli.studies.sweep.verify import verify_run
 

@@ -33,8 +33,13 @@ from landing_cli.scenario.sections import reach_section
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
-from truth.tables import HERE, TruthCase, gravity_field, tetrahedra  # noqa: E402
-from truth.tables import landing_case as truth_case  # noqa: E402
+from truth.tables import (  # noqa: E402
+    HERE,
+    TruthCase,
+    gravity_field,
+    landing_case as truth_case,
+    tetrahedra,
+)
 
 J, CLEARANCE = "performance_index_m2_s3", "terrain_clearance_min_m"
 SHRUNK, STEEP_DEG = 0.7, 85.0

@@ -63,6 +63,8 @@ def is_cached(kernel: Any) -> bool:
     """Tell whether a numba kernel was compiled before, by this version for this kind of processor."""
     try:
         cache = kernel._cache
-        return Path(cache.cache_path, cache._cache_file._index_name).exists()
+        index = Path(cache.cache_path, cache._cache_file._index_name)
+        # its index is written first
+        return index.exists() and any(index.parent.glob(f"{index.stem}*.nbc"))
     except AttributeError:  # another numba
         return True

@@ -7,9 +7,17 @@ from dataclasses import dataclass
 import clarabel
 import numpy as np
 import scipy.sparse as sp
+from kernel_calls import from_python
 
-from landing_cli.optimize.conic_ipm import ROW_REGULARISATION, advance, fill_row_pull, residuals
+from landing_cli.optimize.conic_ipm import (
+    ROW_REGULARISATION,
+    advance,
+    fill_row_pull as fill_row_pull_part,
+    residuals,
+)
 from landing_cli.optimize.conic_records import Model, Point, new_step
+
+fill_row_pull = from_python(fill_row_pull_part)
 
 JORDAN = np.diag([1.0, -1.0, -1.0, -1.0])
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from landing_samples import asteroid, landing_case
 
 from landing_cli.body.gravity.field_values import accelerations
@@ -12,9 +13,9 @@ from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.optimize.conic_records import Model, new_model
 from landing_cli.reach.certificate import certified_thrust_level, gravity_bounds, gravity_tube
 from landing_cli.reach.descent_model import (
-    fill_arc_cones,
-    fill_glide_cones,
-    fill_handover_rows,
+    fill_arc_cones as fill_arc_cones_part,
+    fill_glide_cones as fill_glide_cones_part,
+    fill_handover_rows as fill_handover_rows_part,
 )
 from landing_cli.reach.free_descent import PreparedCase, prepare, solve_prepared, survey
 from landing_cli.reach.free_flights import Question, best_flights
@@ -22,7 +23,12 @@ from landing_cli.reach.free_solve import CONVERGED
 from landing_cli.reach.planes import new_cuts
 from landing_cli.reach.records import Verdict
 from landing_cli.reach.scaled_case import scale_case
-from landing_cli.reach.shooting import fly_accurately
+from landing_cli.reach.shooting import fly_accurately as fly_accurately_part
+
+fill_arc_cones = from_python(fill_arc_cones_part)
+fill_glide_cones = from_python(fill_glide_cones_part)
+fill_handover_rows = from_python(fill_handover_rows_part)
+fly_accurately = from_python(fly_accurately_part)
 
 
 @lru_cache

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from shape_helpers import box, fibonacci_ellipsoid
 
 from landing_cli.body.adjacency import mean_edge_m
@@ -16,11 +17,13 @@ from landing_cli.body.clearance import (
     closest_facets,
     contains,
     path_clearance,
-    signed_distance,
+    signed_distance as signed_distance_part,
     signed_distances,
 )
 from landing_cli.body.mesh import Mesh, facet_areas, facet_centroids, facet_normals
 from landing_cli.errors import InputRefused
+
+signed_distance = from_python(signed_distance_part)
 
 
 def brute_distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:

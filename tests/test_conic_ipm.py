@@ -5,9 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conic_oracles import ByClarabel, DenseNewton, Sizes, copy_of, iterate, rows_on_thrust
+from kernel_calls import from_python
 
-from landing_cli.optimize.conic_ipm import FRACTION_TO_BOUNDARY, advance, fill_row_pull, residuals
+from landing_cli.optimize.conic_ipm import (
+    FRACTION_TO_BOUNDARY,
+    advance,
+    fill_row_pull as fill_row_pull_part,
+    residuals,
+)
 from landing_cli.optimize.conic_records import Model, Point, Step, new_model, new_point, new_step
+
+fill_row_pull = from_python(fill_row_pull_part)
 
 SIZES = {
     "energy": Sizes(6, 4, 6, 6, False),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from numpy.testing import assert_allclose
 
 from landing_cli.body.gravity.harmonics import harmonics_field
@@ -18,16 +19,20 @@ from landing_cli.reach.costate_dynamics import (
     STATE,
     Extremal,
     Field,
-    fly_extremal,
-    new_extremal,
-    tangents,
+    fly_extremal as fly_extremal_part,
+    new_extremal as new_extremal_part,
+    tangents as tangents_part,
 )
+
+fly_extremal = from_python(fly_extremal_part)
+new_extremal = from_python(new_extremal_part)
+tangents = from_python(tangents_part)
 
 SPIN = 2.0 * np.pi / (4.288 * 3600.0)
 EXHAUST = 400.0 * 9.80665
 GRAVITY = harmonics_field(4.892, 246.0, -0.03922, 0.003742)
 SCALE = extremal_scale(20.0, 2000.0, EXHAUST, 500.0, SPIN)
-FIELD = Field(int(GRAVITY.kind), GRAVITY.params, SCALE, SCALE.length_m / np.array([290.0, 280.0, 266.0]))
+FIELD = Field(GRAVITY.kind, GRAVITY.params, SCALE, SCALE.length_m / np.array([290.0, 280.0, 266.0]))
 START, REST = np.array([100.0, -50.0, 780.0]), np.array([0.02, -0.01, 0.0])
 
 THROTTLED = np.array([0.2, -0.1, 0.9, 0.1, -0.05, 0.6, 0.1])

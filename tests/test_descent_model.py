@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from landing_samples import asteroid, landing_case, some_thrust
 from scipy.integrate import quad
 
@@ -15,16 +16,23 @@ from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.optimize.conic_records import Model, Point, new_model, new_point
 from landing_cli.reach.descent_model import (
     Layout,
-    fill_arc_cones,
-    fill_glide_cones,
-    fill_handover_rows,
+    fill_arc_cones as fill_arc_cones_part,
+    fill_glide_cones as fill_glide_cones_part,
+    fill_handover_rows as fill_handover_rows_part,
     layout,
     refresh,
 )
-from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
-from landing_cli.reach.planes import Cuts, arc_weights, new_cuts
-from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level, scale_case
+from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc as measure_arc_part
+from landing_cli.reach.planes import Cuts, arc_weights as arc_weights_part, new_cuts
+from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level as ellipsoid_level_part, scale_case
 from landing_cli.reach.shooting import Path, new_path
+
+arc_weights = from_python(arc_weights_part)
+ellipsoid_level = from_python(ellipsoid_level_part)
+fill_arc_cones = from_python(fill_arc_cones_part)
+fill_glide_cones = from_python(fill_glide_cones_part)
+fill_handover_rows = from_python(fill_handover_rows_part)
+measure_arc = from_python(measure_arc_part)
 
 N = 10
 CUT_NODES = (4, 7, 10)
@@ -157,7 +165,7 @@ def measured_arc(p: Problem) -> tuple[Any, np.ndarray, np.ndarray]:
         p.case.final_stage_s,
         p.case.asteroid.rotation_rate_rad_s,
         craft.exhaust_velocity_m_s,
-        int(field.kind),
+        field.kind,
         field.params,
         points,
     )

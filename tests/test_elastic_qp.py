@@ -5,10 +5,18 @@ from __future__ import annotations
 import clarabel
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from numpy.testing import assert_allclose
 from scipy import sparse
 
-from landing_cli.optimize.elastic_qp import ElasticQP, new_elastic_qp, solve_elastic_qp
+from landing_cli.optimize.elastic_qp import (
+    ElasticQP,
+    new_elastic_qp as new_elastic_qp_part,
+    solve_elastic_qp as solve_elastic_qp_part,
+)
+
+new_elastic_qp = from_python(new_elastic_qp_part)
+solve_elastic_qp = from_python(solve_elastic_qp_part)
 
 N, M = 7, 12
 

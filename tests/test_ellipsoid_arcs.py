@@ -2,18 +2,29 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from landing_samples import asteroid, landing_case
 
 from landing_cli.reach.ellipsoid_arcs import (
     arc_cuts,
     freeze_on_path,
-    last_cut_node,
+    last_cut_node as last_cut_node_part,
     lowest_level,
     lowest_level_between,
 )
 from landing_cli.reach.records import LandingCase
-from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level, ellipsoid_normal, scale_case
-from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
+from landing_cli.reach.scaled_case import (
+    ScaledCase,
+    ellipsoid_level as ellipsoid_level_part,
+    ellipsoid_normal as ellipsoid_normal_part,
+    scale_case,
+)
+from landing_cli.reach.shooting import SUBSTEPS, fly_accurately as fly_accurately_part
+
+ellipsoid_level = from_python(ellipsoid_level_part)
+ellipsoid_normal = from_python(ellipsoid_normal_part)
+fly_accurately = from_python(fly_accurately_part)
+last_cut_node = from_python(last_cut_node_part)
 
 N = 20
 

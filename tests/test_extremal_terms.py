@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from landing_samples import landing_case
 from numpy.testing import assert_allclose
 
@@ -16,11 +17,16 @@ from landing_cli.reach.costate_dynamics import (
     COLUMNS,
     MAX_SPLITS,
     STATE,
-    fly_extremal,
-    new_extremal,
-    tangents,
+    fly_extremal as fly_extremal_part,
+    new_extremal as new_extremal_part,
+    tangents as tangents_part,
 )
-from landing_cli.reach.ellipsoid_dips import LEVEL, dip_row, find_dips, new_dips
+from landing_cli.reach.ellipsoid_dips import (
+    LEVEL,
+    dip_row as dip_row_part,
+    find_dips as find_dips_part,
+    new_dips as new_dips_part,
+)
 from landing_cli.reach.extremal_terms import (
     MAX_ROWS,
     N_ARC,
@@ -30,11 +36,20 @@ from landing_cli.reach.extremal_terms import (
     ROW_PROPELLANT,
     ExtremalProblem,
     extremal_problem,
-    final_energy,
-    handover_hessian,
-    handover_rows,
-    with_guard,
+    final_energy as final_energy_part,
+    handover_hessian as handover_hessian_part,
+    handover_rows as handover_rows_part,
 )
+
+dip_row = from_python(dip_row_part)
+final_energy = from_python(final_energy_part)
+find_dips = from_python(find_dips_part)
+fly_extremal = from_python(fly_extremal_part)
+handover_hessian = from_python(handover_hessian_part)
+handover_rows = from_python(handover_rows_part)
+new_dips = from_python(new_dips_part)
+new_extremal = from_python(new_extremal_part)
+tangents = from_python(tangents_part)
 
 TARGET_M, NORMAL = np.array([120.0, 60.0, 210.0]), np.array([0.36, 0.48, 0.8])
 HANDOVER = (np.array([170.0, 110.0, 300.0]), np.array([-0.4, -0.2, -0.9]), 0.998)
@@ -105,7 +120,7 @@ def test_in_the_papers_reading_the_bound_is_on_the_total_acceleration_alone() ->
 def test_the_guard_is_kept_from_the_thrust_rows_alone() -> None:
     problem = problem_of()
     x = handover_state(problem)
-    change = rows_at(with_guard(problem, 1e-3), x)[0] - rows_at(problem, x)[0]
+    change = rows_at(problem._replace(guard=1e-3), x)[0] - rows_at(problem, x)[0]
     assert_allclose(change[:N_ARC], -1e-3, rtol=1e-9)
     assert np.all(change[N_ARC:] == 0.0)
 

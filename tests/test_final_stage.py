@@ -4,12 +4,23 @@ import math
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from landing_samples import asteroid
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
 from landing_cli.body.gravity.field_values import accelerations
-from landing_cli.reach.final_stage import ARC_SAMPLES, ArcMeasures, arc_state, end_accelerations, measure_arc
+from landing_cli.reach.final_stage import (
+    ARC_SAMPLES,
+    ArcMeasures,
+    arc_state as arc_state_part,
+    end_accelerations as end_accelerations_part,
+    measure_arc as measure_arc_part,
+)
+
+arc_state = from_python(arc_state_part)
+end_accelerations = from_python(end_accelerations_part)
+measure_arc = from_python(measure_arc_part)
 
 T = 200.0
 BODY = asteroid(gravity=5.0, spin=3.0)
@@ -38,7 +49,7 @@ def measured(state: np.ndarray) -> tuple[ArcMeasures, np.ndarray]:
     points = np.zeros((ARC_SAMPLES + 1, 3))
     field = BODY.gravity
     arc = measure_arc(
-        state, MASS_KG, TARGET, NORMAL, T, SPIN[2], EXHAUST_M_S, int(field.kind), field.params, points
+        state, MASS_KG, TARGET, NORMAL, T, SPIN[2], EXHAUST_M_S, field.kind, field.params, points
     )
     return arc, points
 

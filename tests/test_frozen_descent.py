@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conic_oracles import ByClarabel, Sizes, iterate
+from kernel_calls import from_python
 from landing_samples import landing_case
 
 from landing_cli.body.mesh import facet_centroids, facet_normals
@@ -14,8 +15,10 @@ from landing_cli.reach.descent_model import Layout, layout, refresh
 from landing_cli.reach.free_solve import Solver, cold_start
 from landing_cli.reach.planes import new_cuts
 from landing_cli.reach.records import LandingCase
-from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal, scale_case
+from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal as ellipsoid_normal_part, scale_case
 from landing_cli.reach.shooting import new_path
+
+ellipsoid_normal = from_python(ellipsoid_normal_part)
 
 INTERVALS = 12
 WALL_AHEAD = 0.01

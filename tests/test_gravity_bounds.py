@@ -92,7 +92,7 @@ def test_no_point_of_a_patch_exceeds_its_ceiling(name: str, semi_axes: np.ndarra
     field, triangles = FIELDS[name], np.vstack([coarse, _split(_split(_split(coarse[::23])))])
     centres, angles = _centres(triangles)
     at_centre, ceilings, reaches = np.zeros((3, len(triangles)))
-    _fill_ceilings(int(field.kind), field.params, centres, semi_axes, angles, at_centre, ceilings, reaches)
+    _fill_ceilings(field.kind, field.params, centres, semi_axes, angles, at_centre, ceilings, reaches)
     weights = np.vstack([np.eye(3), np.random.default_rng(4).dirichlet([0.5] * 3, 30)])
     for patch, centre, ceiling, reach in zip(triangles, centres, ceilings, reaches, strict=True):
         directions = weights @ patch

@@ -81,8 +81,8 @@ def test_outside_the_box_and_in_the_body_the_polyhedron_answers(fitted: Interpol
 
 def test_third_derivatives_are_the_polyhedrons(fitted: InterpolatedField) -> None:
     place, along = points_in_box(1)[0], (0.3, -0.2, 0.9)
-    found = curvature(int(fitted.field.kind), fitted.field.params, *place, *along)
-    assert found == curvature(int(EXACT.kind), EXACT.params, *place, *along)
+    found = curvature(fitted.field.kind, fitted.field.params, *place, *along)
+    assert found == curvature(EXACT.kind, EXACT.params, *place, *along)
 
 
 def test_the_fitted_field_is_conservative(fitted: InterpolatedField) -> None:

@@ -10,12 +10,20 @@ import numpy as np
 import polyhedral_gravity as pg
 import pytest
 from gravity_helpers import FIELDS, POTATO, icosphere, points_around, read_obj_km
+from kernel_calls import from_python
 from shape_helpers import box
 
 from landing_cli.body.gravity.field_values import accelerations, gradients, potentials
-from landing_cli.body.gravity.polyhedron import inside_share, laplacian, polyhedron_field
+from landing_cli.body.gravity.polyhedron import (
+    inside_share as inside_share_part,
+    laplacian as laplacian_part,
+    polyhedron_field,
+)
 from landing_cli.body.mesh import Mesh
 from landing_cli.errors import InputRefused
+
+inside_share = from_python(inside_share_part)
+laplacian = from_python(laplacian_part)
 
 PACKAGE_G = 6.67430e-11
 SIZE = (3.0, 2.0, 1.0)

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from landing_samples import asteroid, landing_case
-from truth.tables import landing_case as truth_case
-from truth.tables import read_table
+from truth.tables import landing_case as truth_case, read_table
 
 from landing_cli.reach.free_descent import DOUBTFUL_LEVEL, PreparedCase, prepare, solve_prepared, survey
 from landing_cli.reach.margin import ThrustLevels, bound_beyond_full, thrust_levels, thrust_levels_at

@@ -272,8 +272,11 @@ def test_a_cluster_without_workers_is_refused_with_the_command_that_starts_one(l
 
 @pytest.mark.parametrize("fault", STRANGE_WORKERS)
 def test_a_worker_that_cannot_do_the_work_is_named_with_what_to_install(
-    lone_scheduler: str, tmp_path: Path, fault: str
+    lone_scheduler: str, tmp_path: Path, fault: str, monkeypatch
 ):
+    cluster = pytest.importorskip("landing_cli.parallel.cluster")
+    # without our package a worker drops the task, and says nothing
+    monkeypatch.setattr(cluster, "PREFLIGHT_TIMEOUT_S", 15.0)
     (tmp_path / "sitecustomize.py").write_text(STRANGE_WORKERS[fault][0])
     with _worker(lone_scheduler, tmp_path):
         with pytest.raises(InputRefused, match=STRANGE_WORKERS[fault][1]) as caught:

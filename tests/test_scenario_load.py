@@ -10,8 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from scenario_samples import MINIMAL, SHIPPED, write_minimal
 
 from landing_cli.errors import InputRefused, LandingError, UsageError

@@ -2,16 +2,24 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 
 from landing_cli.optimize.second_order_cone import (
     UNBOUNDED,
-    apply_inverse_scaling,
-    apply_inverse_scaling_squared,
-    apply_scaling,
-    complementarity_shift,
-    longest_step,
-    scaling_point,
+    apply_inverse_scaling as apply_inverse_scaling_part,
+    apply_inverse_scaling_squared as apply_inverse_scaling_squared_part,
+    apply_scaling as apply_scaling_part,
+    complementarity_shift as complementarity_shift_part,
+    longest_step as longest_step_part,
+    scaling_point as scaling_point_part,
 )
+
+apply_inverse_scaling = from_python(apply_inverse_scaling_part)
+apply_inverse_scaling_squared = from_python(apply_inverse_scaling_squared_part)
+apply_scaling = from_python(apply_scaling_part)
+complementarity_shift = from_python(complementarity_shift_part)
+longest_step = from_python(longest_step_part)
+scaling_point = from_python(scaling_point_part)
 
 J = np.diag([1.0, -1.0, -1.0, -1.0])
 E = np.array([1.0, 0.0, 0.0, 0.0])

@@ -4,13 +4,25 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from landing_samples import asteroid, flown_by_dop853, landing_case, some_thrust, without_gravity
 
 from landing_cli.body.gravity.field_values import gradients
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
-from landing_cli.reach.shooting import Path, fly, fly_accurately, measure_defect, new_path, pull_back
+from landing_cli.reach.shooting import (
+    Path,
+    fly,
+    fly_accurately as fly_accurately_part,
+    measure_defect as measure_defect_part,
+    new_path,
+    pull_back as pull_back_part,
+)
+
+fly_accurately = from_python(fly_accurately_part)
+measure_defect = from_python(measure_defect_part)
+pull_back = from_python(pull_back_part)
 
 # Gravity, spin and mass flow well above Bennu's, so that no term hides.
 STRONG = asteroid(gravity=8.0, spin=5.0)

@@ -7,23 +7,32 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from landing_samples import asteroid, landing_case
-from truth.tables import landing_case as true_case
-from truth.tables import read_table
+from truth.tables import landing_case as true_case, read_table
 
 from landing_cli.optimize.conic_records import new_model
 from landing_cli.reach import sides
 from landing_cli.reach.certificate import certified_thrust_level
 from landing_cli.reach.descent_model import (
-    fill_arc_cones,
-    fill_glide_cones,
-    fill_handover_rows,
+    fill_arc_cones as fill_arc_cones_part,
+    fill_glide_cones as fill_glide_cones_part,
+    fill_handover_rows as fill_handover_rows_part,
 )
 from landing_cli.reach.free_descent import PreparedCase, prepare, solve_prepared, survey
 from landing_cli.reach.margin import least_thrust_flights
 from landing_cli.reach.planes import Cuts
 from landing_cli.reach.records import Binding, Verdict
-from landing_cli.reach.scaled_case import ellipsoid_level, ellipsoid_normal
+from landing_cli.reach.scaled_case import (
+    ellipsoid_level as ellipsoid_level_part,
+    ellipsoid_normal as ellipsoid_normal_part,
+)
+
+ellipsoid_level = from_python(ellipsoid_level_part)
+ellipsoid_normal = from_python(ellipsoid_normal_part)
+fill_arc_cones = from_python(fill_arc_cones_part)
+fill_glide_cones = from_python(fill_glide_cones_part)
+fill_handover_rows = from_python(fill_handover_rows_part)
 
 CASES: dict[str, dict[str, Any]] = {
     "outside": {"position_m": np.array([300.0, 100.0, 650.0]), "tof_s": 780.0},

@@ -3,8 +3,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg
+from kernel_calls import from_python
 
-from landing_cli.optimize.small_dense import SMALLEST_PIVOT, cholesky, cholesky_solve
+from landing_cli.optimize.small_dense import (
+    SMALLEST_PIVOT,
+    cholesky as cholesky_part,
+    cholesky_solve as cholesky_solve_part,
+)
+
+cholesky = from_python(cholesky_part)
+cholesky_solve = from_python(cholesky_solve_part)
 
 
 def positive_definite(size: int, condition: float, seed: int = 0) -> np.ndarray:

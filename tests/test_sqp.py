@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from numpy.testing import assert_allclose
 
 from landing_cli.optimize.sqp import (
     LocalModel,
-    add_secant,
-    convexify,
-    new_local_model,
-    propose,
+    add_secant as add_secant_part,
+    convexify as convexify_part,
+    new_local_model as new_local_model_part,
+    propose as propose_part,
     violation,
 )
+
+add_secant = from_python(add_secant_part)
+convexify = from_python(convexify_part)
+new_local_model = from_python(new_local_model_part)
+propose = from_python(propose_part)
 
 
 def test_violation_counts_equalities_by_size_and_the_pool_by_its_worst() -> None:

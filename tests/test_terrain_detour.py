@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 from landing_samples import asteroid, flown_by_dop853, landing_case, rock
-from truth.tables import HERE, TruthCase, gravity_field, tetrahedra
-from truth.tables import landing_case as truth_case
+from truth.tables import HERE, TruthCase, gravity_field, landing_case as truth_case, tetrahedra
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.mesh import Mesh

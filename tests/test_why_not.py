@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from landing_samples import asteroid, landing_case, rock
-from truth.tables import landing_case as true_case
-from truth.tables import read_table
+from truth.tables import landing_case as true_case, read_table
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.point_mass import point_mass_field

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.adjacency import facet_neighbours
 from landing_cli.body.mesh import Mesh, facet_centroids, facet_normals
-from landing_cli.kernel import kernel
+from landing_cli.kernel import part
 from landing_cli.kernel_record import by_reference
 
 FloatArray = NDArray[np.float64]
@@ -139,7 +139,7 @@ def _pseudonormals(mesh: Mesh, normals: FloatArray) -> FloatArray:
     return result
 
 
-@kernel
+@part
 def box_distance2(boxes: FloatArray, node: int, x: float, y: float, z: float) -> float:
     """Squared distance from a point to the box of a node, m2."""
     b = boxes[node]
@@ -152,14 +152,14 @@ def box_distance2(boxes: FloatArray, node: int, x: float, y: float, z: float) ->
     return du * du + dv * dv + dw * dw
 
 
-@kernel
+@part
 def _edge_distance2(px: float, py: float, pz: float, ex: float, ey: float, ez: float, along: float) -> float:
     """Squared distance of p (from the edge's tail) to the point at a share of the edge e."""
     dx, dy, dz = px - along * ex, py - along * ey, pz - along * ez
     return dx * dx + dy * dy + dz * dz
 
 
-@kernel
+@part
 def triangle_distance2(triangles: FloatArray, slot: int, x: float, y: float, z: float) -> tuple[float, int]:
     """Squared distance from a point to a facet, m2, and the feature that is closest.
 
@@ -195,7 +195,7 @@ def triangle_distance2(triangles: FloatArray, slot: int, x: float, y: float, z: 
     return height * height, FACE
 
 
-@kernel
+@part
 def closest_slot(
     surface: SurfaceIndex, x: float, y: float, z: float, bound2: float, slot: int, feature: int
 ) -> tuple[float, int, int]:

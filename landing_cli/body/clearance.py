@@ -14,7 +14,7 @@ from landing_cli.body.bvh import (
     closest_slot,
     triangle_distance2,
 )
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -58,7 +58,7 @@ def contains(surface: SurfaceIndex, points: ArrayLike) -> NDArray[np.bool_]:
     return np.asarray(signed_distances(surface, points) < 0.0)
 
 
-@kernel
+@part
 def _with_sign(
     surface: SurfaceIndex, distance2: float, slot: int, feature: int, x: float, y: float, z: float
 ) -> float:
@@ -76,7 +76,7 @@ def _with_sign(
     return -np.sqrt(distance2) if side < 0.0 else np.sqrt(distance2)
 
 
-@kernel
+@part
 def signed_distance(
     surface: SurfaceIndex, x: float, y: float, z: float, upper_bound: float
 ) -> tuple[float, int]:
@@ -102,7 +102,7 @@ def signed_distance(
     return _with_sign(surface, distance2, slot, feature, x, y, z), surface.facets[slot]
 
 
-@kernel
+@part
 def signed_distance_from(surface: SurfaceIndex, x: float, y: float, z: float, slot: int) -> tuple[float, int]:
     """Signed distance from one point to the surface, and the slot of the closest facet.
 

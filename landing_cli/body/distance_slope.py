@@ -16,7 +16,7 @@ from landing_cli.body.bvh import (
     triangle_distance2,
 )
 from landing_cli.body.vertex_distance import vertex_distance
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def _fill(surface: SurfaceIndex, points: FloatArray, distances: FloatArray, slop
         distances[i] = -np.sqrt(distance2) if side < 0.0 else np.sqrt(distance2)
 
 
-@kernel
+@part
 def _offset(t: FloatArray, feature: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Vector to a point from its closest point on a feature of a facet; of a face, along its normal."""
     if feature == FACE:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.body.bvh import SurfaceIndex
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -69,7 +69,7 @@ def _rows(points: ArrayLike) -> FloatArray:
     return np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
 
 
-@kernel
+@part
 def _meets_box(
     b: FloatArray, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, least: float, most: float
 ) -> bool:
@@ -89,7 +89,7 @@ def _meets_box(
     return least <= most
 
 
-@kernel
+@part
 def _triangle_hit(t: FloatArray, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float) -> float:
     """Share of d at which the ray o + t d meets a facet (12 numbers of a slot); NaN where it does not.
 
@@ -113,7 +113,7 @@ def _triangle_hit(t: FloatArray, ox: float, oy: float, oz: float, dx: float, dy:
     return (ax * t[9] + ay * t[10] + az * t[11]) / along
 
 
-@kernel
+@part
 def ray_hit(
     surface: SurfaceIndex,
     ox: float,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from landing_cli.body.bvh import FloatArray, SurfaceIndex, box_distance2
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 
 def vertex_distances(surface: SurfaceIndex, points: ArrayLike) -> FloatArray:
@@ -31,7 +31,7 @@ def vertex_distances(surface: SurfaceIndex, points: ArrayLike) -> FloatArray:
     return distances
 
 
-@kernel
+@part
 def vertex_distance(surface: SurfaceIndex, x: float, y: float, z: float, slot: int) -> tuple[float, int]:
     """Distance from one point to the nearest vertex, and a slot whose facet has it.
 
@@ -80,7 +80,7 @@ def vertex_distance(surface: SurfaceIndex, x: float, y: float, z: float, slot: i
             descended = box_distance2(boxes, node, x, y, z) < least2
 
 
-@kernel
+@part
 def _corner_distance2(triangles: FloatArray, slot: int, x: float, y: float, z: float) -> float:
     """Squared distance from a point to the nearest corner of a facet, m2."""
     t = triangles[slot]

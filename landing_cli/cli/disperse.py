@@ -102,8 +102,7 @@ def disperse(
 
         _say_plan(request_of(loaded), path, as_json)
         return
-    from landing_cli.studies.disperse.pipeline import RunOptions
-    from landing_cli.studies.disperse.pipeline import run as run_dispersion
+    from landing_cli.studies.disperse.pipeline import RunOptions, run as run_dispersion
 
     options = RunOptions(plan=plan, resume=resume, force=force)
     outcome = carry_out(

@@ -90,8 +90,7 @@ def isochrone(
     if dry_run:
         _say_plan(loaded, path, as_json)
         return
-    from landing_cli.studies.isochrone.pipeline import RunOptions
-    from landing_cli.studies.isochrone.pipeline import run as run_isochrone
+    from landing_cli.studies.isochrone.pipeline import RunOptions, run as run_isochrone
 
     options = RunOptions(plan=plan, resume=resume, force=force)
     outcome = carry_out(

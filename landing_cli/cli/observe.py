@@ -99,8 +99,7 @@ def observe(
     if dry_run:
         _say_tasks(request, path, as_json)
         return
-    from landing_cli.observe.pipeline import RunOptions
-    from landing_cli.observe.pipeline import run as run_observe
+    from landing_cli.observe.pipeline import RunOptions, run as run_observe
 
     options = RunOptions(plan=work, resume=resume, force=force)
     outcome = carry_out(

@@ -281,8 +281,7 @@ def _carry_out(
     if way.dry_run:
         _say_tasks(request, tasks, path, way.as_json)
         return
-    from landing_cli.plan.pipeline import RunOptions
-    from landing_cli.plan.pipeline import run as run_plans
+    from landing_cli.plan.pipeline import RunOptions, run as run_plans
 
     options = RunOptions(plan=work, resume=way.resume, force=way.force)
     outcome = carry_out(

@@ -104,8 +104,7 @@ def run(
     if dry_run:
         _say_plan(loaded, path, as_json)
         return
-    from landing_cli.reach.pipeline import RunOptions
-    from landing_cli.reach.pipeline import run as run_reach
+    from landing_cli.reach.pipeline import RunOptions, run as run_reach
 
     options = RunOptions(plan=plan, resume=resume, force=force, compare=compare)
     outcome = carry_out(

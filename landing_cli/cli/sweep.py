@@ -70,8 +70,7 @@ def sweep(
     otherwise, and prints a table of the cells.
     """
     plan = work_plan(jobs, backend, scheduler)
-    from landing_cli.studies.sweep.pipeline import RunOptions, grid_of
-    from landing_cli.studies.sweep.pipeline import run as run_sweep
+    from landing_cli.studies.sweep.pipeline import RunOptions, grid_of, run as run_sweep
 
     voice = console.Console(quiet)
     grid = grid_of(scenario, overrides or (), over or ())

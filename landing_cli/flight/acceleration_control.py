@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.flight.bezier_curve import curve_states
 from landing_cli.flight.control import SampledControl, ThrustPiece, sampled_control, thrust_pieces
 from landing_cli.flight.dynamics import natural_acceleration
@@ -59,7 +60,7 @@ def _bezier_accelerations(leg: BezierLeg, t_s: FloatArray, w: float) -> FloatArr
     t_s = np.asarray(t_s, dtype=np.float64)
     r, v, a = curve_states(leg.points_m, leg.duration_s, t_s / leg.duration_s)
     natural = np.zeros_like(r)
-    natural_accelerations(int(leg.gravity.kind), leg.gravity.params, w, r, v, natural)
+    natural_accelerations(leg.gravity.kind, leg.gravity.params, w, r, v, natural)
     return np.asarray(a - natural)
 
 
@@ -147,14 +148,14 @@ for _kind in (BezierLeg, LinearAccelerationLeg, GaussAccelerationLeg):
 
 @kernel
 def natural_accelerations(
-    kind: int, params: FloatArray, w: float, r: FloatArray, v: FloatArray, out: FloatArray
+    kind: GravityKind, params: FloatArray, w: float, r: FloatArray, v: FloatArray, out: FloatArray
 ) -> None:
     """Write the acceleration without thrust at each state: gravity, Coriolis and centrifugal.
 
     Parameters
     ----------
-    kind : int
-        Gravity model, a ``GravityKind``.
+    kind : GravityKind
+        Gravity model to fly in.
     params : (p,) float, SI
         Parameters of the gravity model.
     w : float, rad/s

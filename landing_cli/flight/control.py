@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from landing_cli.body.gravity.field import GravityField
+from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.flight.dynamics import about_z, natural_acceleration
 from landing_cli.flight.extremal import (
     ExtremalScale,
@@ -175,7 +175,7 @@ def _rates(
     field: GravityField, scale: ExtremalScale, saturated: bool, _t: float, y: FloatArray
 ) -> FloatArray:
     out = np.zeros(14)
-    extremal_rates(int(field.kind), field.params, scale, saturated, y, out)
+    extremal_rates(field.kind, field.params, scale, saturated, y, out)
     return out
 
 
@@ -208,7 +208,7 @@ def _costate_sampled(leg: CostateLeg, w: float, ve: float) -> SampledControl:
     scale, y = _scaled(leg, w, ve)
     size = _EXTREMAL_STEPS + _KINKS
     steps, stages, knots = np.zeros(size), np.zeros((size, STAGES, 3)), np.zeros((size + 1, 3))
-    kind, params = int(leg.gravity.kind), leg.gravity.params
+    kind, params = leg.gravity.kind, leg.gravity.params
     k = sample_extremal(kind, params, scale, y, _EXTREMAL_STEPS, steps, stages, knots)
     bound = leg.thrust_max_n
     return SampledControl(
@@ -218,7 +218,7 @@ def _costate_sampled(leg: CostateLeg, w: float, ve: float) -> SampledControl:
 
 @kernel
 def _arc_thrust(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     w: float,
     to_go: FloatArray,
@@ -243,7 +243,7 @@ def _arc_thrusts(leg: FinalArcLeg, w: float, t: FloatArray) -> FloatArray:
     out = np.zeros((t.size, 3))
     to_go = leg.duration_s - t.ravel()
     target = np.array(leg.target_m, dtype=np.float64)
-    _arc_thrust(int(leg.gravity.kind), leg.gravity.params, w, to_go, target, A, B, out)
+    _arc_thrust(leg.gravity.kind, leg.gravity.params, w, to_go, target, A, B, out)
     return out.reshape(*t.shape, 3)
 
 

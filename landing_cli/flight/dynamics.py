@@ -7,23 +7,31 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from landing_cli.body.gravity.field import GravityField
+from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.kernels import acceleration, potential
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 
 
 @kernel
 def natural_acceleration(
-    kind: int, params: FloatArray, w: float, x: float, y: float, z: float, vx: float, vy: float, vz: float
+    kind: GravityKind,
+    params: FloatArray,
+    w: float,
+    x: float,
+    y: float,
+    z: float,
+    vx: float,
+    vy: float,
+    vz: float,
 ) -> tuple[float, float, float]:
     """Acceleration without thrust: gravity, Coriolis and centrifugal (Zhao 2022, eq 1).
 
     Parameters
     ----------
-    kind : int
-        Gravity model, a ``GravityKind``.
+    kind : GravityKind
+        Gravity model to fly in.
     params : (p,) float, SI
         Parameters of the gravity model.
     w : float, rad/s
@@ -41,9 +49,9 @@ def natural_acceleration(
     return gx + w * (2.0 * vy + w * x), gy + w * (-2.0 * vx + w * y), gz
 
 
-@kernel
+@part
 def rk4_step(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     w: float,
     ve: float,
@@ -58,8 +66,8 @@ def rk4_step(
 
     Parameters
     ----------
-    kind : int
-        Gravity model, a ``GravityKind``.
+    kind : GravityKind
+        Gravity model to fly in.
     params : (p,) float, SI
         Parameters of the gravity model.
     w : float, rad/s
@@ -105,9 +113,9 @@ def turn(angle: float, vector: FloatArray, out: FloatArray) -> None:
     out[0], out[1], out[2] = c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2]
 
 
-@kernel
+@part
 def fly_nodes(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     w: float,
     ve: float,
@@ -120,8 +128,8 @@ def fly_nodes(
 
     Parameters
     ----------
-    kind : int
-        Gravity model, a ``GravityKind``.
+    kind : GravityKind
+        Gravity model to fly in.
     params : (p,) float, SI
         Parameters of the gravity model.
     w : float, rad/s
@@ -152,7 +160,12 @@ def fly_nodes(
 
 @kernel
 def _jacobi_constants(
-    kind: int, params: FloatArray, w: float, position: FloatArray, velocity: FloatArray, out: FloatArray
+    kind: GravityKind,
+    params: FloatArray,
+    w: float,
+    position: FloatArray,
+    velocity: FloatArray,
+    out: FloatArray,
 ) -> None:
     for i in range(out.shape[0]):
         x, y, z = position[i, 0], position[i, 1], position[i, 2]
@@ -184,7 +197,7 @@ def jacobi_constant(
     position = np.ascontiguousarray(np.atleast_2d(position_m), dtype=np.float64)
     velocity = np.ascontiguousarray(np.atleast_2d(velocity_m_s), dtype=np.float64)
     out = np.zeros(len(position))
-    _jacobi_constants(int(field.kind), field.params, rotation_rate_rad_s, position, velocity, out)
+    _jacobi_constants(field.kind, field.params, rotation_rate_rad_s, position, velocity, out)
     return out
 
 

@@ -207,7 +207,7 @@ def fly_closed_loop(
     starts, times, squares, cubes = [], [], [], []
     now, arrived = 0.0, False
     for _ in range(_MOST_CYCLES):
-        g = np.array(natural_acceleration(int(field.kind), field.params, rotation_rate_rad_s, *r, *v))
+        g = np.array(natural_acceleration(field.kind, field.params, rotation_rate_rad_s, *r, *v))
         to_go = time_to_go(r - target_m, v, g)
         A, B = _cubic(r - target_m, v, to_go)
         starts.append(now)

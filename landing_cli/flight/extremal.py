@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernel_types import VectorAndSymmetric
 from landing_cli.body.gravity.kernels import acceleration_and_gradient
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 
@@ -111,7 +112,7 @@ def thrust_ratio(flow: float, saturated: bool, y: FloatArray) -> tuple[float, fl
     return 1.0 if saturated else norm / y[6] + flow * y[13], norm
 
 
-@kernel
+@part
 def rates_in_gravity(
     scale: ExtremalScale, saturated: bool, y: FloatArray, g: VectorAndSymmetric, out: FloatArray
 ) -> None:
@@ -150,7 +151,12 @@ def rates_in_gravity(
 
 @kernel
 def extremal_rates(
-    kind: int, params: FloatArray, scale: ExtremalScale, saturated: bool, y: FloatArray, out: FloatArray
+    kind: GravityKind,
+    params: FloatArray,
+    scale: ExtremalScale,
+    saturated: bool,
+    y: FloatArray,
+    out: FloatArray,
 ) -> None:
     """Write the rates of ``rates_in_gravity`` in a gravity field (kind, params)."""
     length = scale.length_m

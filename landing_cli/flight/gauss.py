@@ -11,9 +11,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.flight.dynamics import natural_acceleration
 from landing_cli.flight.extremal import ExtremalScale, extremal_rates, scaled_thrust, thrust_ratio
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 
@@ -37,7 +38,7 @@ _GAUSS_BA = GAUSS_B @ GAUSS_A
 
 @kernel
 def fly_sampled(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     w: float,
     ve: float,
@@ -50,7 +51,7 @@ def fly_sampled(
 
     Parameters
     ----------
-    kind : int
+    kind : GravityKind
         Gravity model to fly in.
     params : (p,) float, SI
         Parameters of the gravity model.
@@ -115,7 +116,7 @@ def fly_sampled(
     return worst
 
 
-@kernel
+@part
 def _stage_masses(
     h: float, ve: float, m: float, control: FloatArray, per_mass: bool, mass: FloatArray
 ) -> float:
@@ -133,9 +134,9 @@ def _stage_masses(
     return m * math.exp(-total) if per_mass else m - total
 
 
-@kernel
+@part
 def _extremal_step(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     scale: ExtremalScale,
     saturated: bool,
@@ -171,7 +172,7 @@ def _extremal_step(
             out[a] += h * GAUSS_B[j] * K[j, a]
 
 
-@kernel
+@part
 def _first_crossing(scale: ExtremalScale, saturated: bool, stages: FloatArray, out: FloatArray) -> float:
     """Return the fraction of the step by which the switching function has crossed 1; 2 if it has not."""
     for i in range(STAGES):
@@ -184,7 +185,7 @@ def _first_crossing(scale: ExtremalScale, saturated: bool, stages: FloatArray, o
 
 @kernel
 def sample_extremal(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     scale: ExtremalScale,
     y: FloatArray,
@@ -197,8 +198,8 @@ def sample_extremal(
 
     Parameters
     ----------
-    kind : int
-        Gravity model, a ``GravityKind``.
+    kind : GravityKind
+        Gravity model to fly in.
     params : (p,) float, SI
         Parameters of the gravity model.
     scale : ExtremalScale
@@ -244,9 +245,9 @@ def sample_extremal(
     return k
 
 
-@kernel
+@part
 def _to_the_kink(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     scale: ExtremalScale,
     saturated: bool,

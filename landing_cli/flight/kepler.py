@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 State = tuple[float, float, float, float, float, float]
@@ -24,7 +24,7 @@ _CUBIC_ENOUGH = 1e-7  # relative step after which a third-order method is at rou
 _SERIES_BELOW = 0.5  # |beta s^2| under which the closed forms would cancel
 
 
-@kernel
+@part
 def stumpff_g(beta: float, s: float) -> tuple[float, float, float, float]:
     """The functions G0 to G3 of universal variables.
 
@@ -58,7 +58,7 @@ def stumpff_g(beta: float, s: float) -> tuple[float, float, float, float]:
     return 1.0 - beta * g2, g1, g2, (s - g1) / beta
 
 
-@kernel
+@part
 def universal_anomaly(mu: float, r0: float, sigma: float, beta: float, t: float) -> float:
     """Solve Kepler's equation in universal variables forwards in time.
 
@@ -107,7 +107,7 @@ def universal_anomaly(mu: float, r0: float, sigma: float, beta: float, t: float)
     return math.nan
 
 
-@kernel
+@part
 def kepler_state(
     mu: float, x: float, y: float, z: float, vx: float, vy: float, vz: float, dt: float
 ) -> State:

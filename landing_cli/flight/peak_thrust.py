@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration_and_gradient
 from landing_cli.flight.legs import BezierLeg
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 
@@ -32,7 +33,7 @@ class FlownCurve(NamedTuple):
     ----------
     points : (4, n + 1, 3) float, m/s^k
         Row k: control points of the k-th time derivative; those beyond its degree are zero.
-    kind : int
+    kind : GravityKind
     params : (p,) float, SI
         Gravity model.
     w : float, rad/s
@@ -43,7 +44,7 @@ class FlownCurve(NamedTuple):
     """
 
     points: FloatArray
-    kind: int
+    kind: GravityKind
     params: FloatArray
     w: float
     exhaust_velocity: float
@@ -73,7 +74,7 @@ def flown_curve(leg: BezierLeg, rotation_rate_rad_s: float, exhaust_velocity_m_s
         points[k, : degree + 1 - k] = scale * np.diff(leg.points_m, k, axis=0)
     field = leg.gravity
     return FlownCurve(
-        points, int(field.kind), field.params, rotation_rate_rad_s, exhaust_velocity_m_s, leg.duration_s
+        points, field.kind, field.params, rotation_rate_rad_s, exhaust_velocity_m_s, leg.duration_s
     )
 
 
@@ -100,7 +101,7 @@ def peak_acceleration(
     return value, tau * leg.duration_s
 
 
-@kernel
+@part
 def bezier_point(points: FloatArray, degree: int, tau: float) -> tuple[float, float, float]:
     """Point of a Bezier curve, by Horner's rule in tau / (1 - tau), or its reverse beyond the middle.
 
@@ -129,7 +130,7 @@ def bezier_point(points: FloatArray, degree: int, tau: float) -> tuple[float, fl
     return scale * x, scale * y, scale * z
 
 
-@kernel
+@part
 def thrust_slope(curve: FlownCurve, tau: float) -> tuple[float, float]:
     """Thrust acceleration, and a number of the sign of the thrust's rate.
 
@@ -162,7 +163,7 @@ def thrust_slope(curve: FlownCurve, tau: float) -> tuple[float, float]:
     return size, ux * sx + uy * sy + uz * sz - size**3 / curve.exhaust_velocity
 
 
-@kernel
+@part
 def _burnt(curve: FlownCurve, h: float, u: float, slope: float, after: float, next_slope: float) -> float:
     """Velocity increment over a share h of the curve: trapezoidal, corrected by the rates at its ends.
 

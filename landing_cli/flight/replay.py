@@ -127,7 +127,7 @@ def _fly_gauss(start: FloatArray, leg: Leg, w: float, field: GravityField, ve: f
     control = sampled_control(leg, w, ve)
     states = np.zeros((len(control.knots), 7))
     states[0] = start
-    kind, params = int(field.kind), field.params
+    kind, params = field.kind, field.params
     fly_sampled(kind, params, w, ve, control.steps_s, control.stages, control.per_mass, states)
     force = control.knots * states[:, 6:] if control.per_mass else control.knots
     return np.concatenate([[0.0], np.cumsum(control.steps_s)]), states, force
@@ -161,5 +161,5 @@ def _rates(
     t: float, y: FloatArray, piece: ThrustPiece, w: float, field: GravityField, ve: float
 ) -> FloatArray:
     force = piece.thrust(t, y[6])
-    natural = natural_acceleration(int(field.kind), field.params, w, *y[:6])
+    natural = natural_acceleration(field.kind, field.params, w, *y[:6])
     return np.concatenate([y[3:6], natural + force / y[6], [-np.linalg.norm(force) / ve]])

@@ -186,7 +186,7 @@ def _glide_slope_blocks(flight: EnergyFlight, pick: sparse.csr_array) -> list[Co
     rows = sparse.kron(sparse.eye_array(n), lift, format="csr") @ nodes
     field = case.asteroid.gravity
     natural = natural_acceleration(
-        int(field.kind), field.params, case.asteroid.rotation_rate_rad_s, *case.frame.origin_m, 0.0, 0.0, 0.0
+        field.kind, field.params, case.asteroid.rotation_rate_rad_s, *case.frame.origin_m, 0.0, 0.0, 0.0
     )
     touchdown = sparse.csr_array(lift) @ pick[WIDTH * n + np.arange(6, 9)]
     return [

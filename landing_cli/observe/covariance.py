@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.field_values import gradients
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 from landing_cli.observe.measurements import hard_sight, information_along
 from landing_cli.observe.observed import Path, Seen, Sigma
 from landing_cli.observe.path_samples import positions_at
@@ -153,7 +153,7 @@ def _filtered(
     return before, after
 
 
-@kernel
+@part
 def _gain(P: FloatArray, information: FloatArray, kept: FloatArray) -> None:
     """Write I - P H' M (I + H P H' M)^-1 H: the update takes P to ``kept P``; M may be singular.
 
@@ -183,7 +183,7 @@ def _gain(P: FloatArray, information: FloatArray, kept: FloatArray) -> None:
                 kept[a, b] -= pulled * C[c, b] / determinant
 
 
-@kernel
+@part
 def _sandwich(left: FloatArray, P: FloatArray, transposed: bool, out: FloatArray) -> None:
     """Write left P left', or left' P left where transposed, of 6 x 6 matrices, P symmetric."""
     half = np.zeros((6, 6))

@@ -150,9 +150,7 @@ def inverse_dynamics(case: ObserveCase, r: FloatArray, v: FloatArray, a: FloatAr
     (k, 3) float, m/s2, body frame
     """
     field, natural = case.asteroid.gravity, np.zeros_like(r)
-    natural_accelerations(
-        int(field.kind), field.params, case.asteroid.rotation_rate_rad_s, *_plain(r, v), natural
-    )
+    natural_accelerations(field.kind, field.params, case.asteroid.rotation_rate_rad_s, *_plain(r, v), natural)
     return np.asarray(a - natural)
 
 

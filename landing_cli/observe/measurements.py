@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 from landing_cli.kernel_record import by_reference
 from landing_cli.observe.records import Landmarks, ObserveCase, Sensor
 
@@ -171,12 +171,12 @@ def information_slopes(sight: Sight, position_m: FloatArray, by_information: Flo
     return slopes
 
 
-@kernel
+@part
 def _logistic(room: float) -> float:
     return 1.0 / (1.0 + math.exp(-room)) if room > -700.0 else 0.0
 
 
-@kernel
+@part
 def _weight(
     sight: Sight,
     j: int,
@@ -228,7 +228,7 @@ def _weight(
     return weight
 
 
-@kernel
+@part
 def _aim(sight: Sight, p: FloatArray, boresight: FloatArray) -> float:
     """Write the sensor's axis; returns the distance to the site where it points there, else 0."""
     away = 0.0
@@ -243,7 +243,7 @@ def _aim(sight: Sight, p: FloatArray, boresight: FloatArray) -> float:
     return away
 
 
-@kernel
+@part
 def _look(sight: Sight, j: int, p: FloatArray, u: FloatArray) -> float:
     """Write the line of sight to a landmark; returns its length."""
     x, y, z = sight.landmark[j, 0] - p[0], sight.landmark[j, 1] - p[1], sight.landmark[j, 2] - p[2]

@@ -83,7 +83,7 @@ def guided_flight(case: ObserveCase) -> GuidedFlight:
         return fly_for(*state, site, case.tof_s)
     if case.time_of_flight == "search":
         return fly_for(*state, site, least_cost_duration(field, w, *state, site, case.tof_range_s))
-    if not np.any(natural_acceleration(int(field.kind), field.params, w, *state[0], *state[1])):
+    if not np.any(natural_acceleration(field.kind, field.params, w, *state[0], *state[1])):
         raise InputRefused(
             "gravity and rotation balance at the start, so that no time to go follows from them",
             where=case.name,

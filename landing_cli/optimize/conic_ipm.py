@@ -21,7 +21,7 @@ so that an inequality row has lambda = -eta with eta >= 0 complementary to its s
 
 from __future__ import annotations
 
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, kernel, part
 from landing_cli.optimize.conic_records import Y_SIZE, Model, Point, Step
 from landing_cli.optimize.second_order_cone import (
     UNBOUNDED,
@@ -37,7 +37,7 @@ FRACTION_TO_BOUNDARY = 0.98
 ROW_REGULARISATION = 1e-9
 
 
-@kernel
+@part
 def fill_row_pull(point: Point, model: Model, n_rows: int) -> None:
     """Fill ``model.row_pull`` from the rows and their multipliers."""
     model.row_pull[:, :] = 0.0
@@ -102,7 +102,7 @@ def residuals(
     return primal, dual, gap
 
 
-@kernel
+@part
 def _scale_cones(point: Point, model: Model, step: Step, n_cones: int) -> None:
     """Scale the cones on y and start the order-7 system with their Hessians."""
     reduced = step.reduced
@@ -121,7 +121,7 @@ def _scale_cones(point: Point, model: Model, step: Step, n_cones: int) -> None:
                 reduced[a, b] += A[0, a] * g0 + A[1, a] * g1 + A[2, a] * g2 + A[3, a] * g3
 
 
-@kernel
+@part
 def _eliminate_nodes(point: Point, model: Model, step: Step, n_rows: int) -> None:
     """Scale every node's cone and add its share of the Schur complement."""
     schur, coupling = step.schur, step.coupling
@@ -196,7 +196,7 @@ def factorise(
     cholesky(step.reduced, step.d_y.shape[0])
 
 
-@kernel
+@part
 def _right_hand_side(
     point: Point,
     model: Model,
@@ -264,7 +264,7 @@ def _right_hand_side(
         step.rhs_y[0] = 0.0
 
 
-@kernel
+@part
 def _solve_dense(step: Step, n_rows: int) -> None:
     """Solve B dy - M dlambda = rhs_rows and H dy + B' dlambda = rhs_y."""
     cholesky_solve(step.schur, n_rows, step.rhs_rows)
@@ -281,7 +281,7 @@ def _solve_dense(step: Step, n_rows: int) -> None:
         step.d_multiplier[i] = total
 
 
-@kernel
+@part
 def _recover_cones(point: Point, model: Model, step: Step, n_equal: int, n_rows: int, n_cones: int) -> float:
     """Directions of the cones on y and of the inequality rows; the longest step they allow."""
     longest = UNBOUNDED
@@ -310,7 +310,7 @@ def _recover_cones(point: Point, model: Model, step: Step, n_equal: int, n_rows:
     return longest
 
 
-@kernel
+@part
 def _recover_nodes(point: Point, model: Model, step: Step, n_rows: int) -> float:
     """Directions of the thrust nodes and their duals; the longest step they allow."""
     longest = UNBOUNDED

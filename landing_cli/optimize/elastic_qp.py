@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, part
 from landing_cli.optimize.small_dense import cholesky, cholesky_solve
 
 Floats = NDArray[np.float64]
@@ -46,13 +46,13 @@ SLACK, GIVE, DUAL, LEFT, WEIGHT, SHIFT, D_SLACK, D_GIVE, D_DUAL = range(9)
 # below holds for them too. WEIGHT is D = 1 / (slack / dual + give / left).
 
 
-@kernel
+@part
 def new_elastic_qp(n: int, m: int) -> ElasticQP:
     """A zeroed program with room for n unknowns and m rows."""
     return ElasticQP(np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m), np.ones(m), np.ones(n))
 
 
-@kernel
+@part
 def _row_dot(qp: ElasticQP, m: int, i: int, d: Floats) -> float:
     """a_i'd, the box's sides being rows m.. with unit vectors."""
     n = d.shape[0]
@@ -91,7 +91,7 @@ def _factor(qp: ElasticQP, m: int, w: Floats, M: Floats) -> None:
     cholesky(M, n)
 
 
-@kernel
+@part
 def _direction(
     qp: ElasticQP,
     m: int,
@@ -131,7 +131,7 @@ def _direction(
         w[D_GIVE, i] += w[GIVE, i] / w[LEFT, i] * change
 
 
-@kernel
+@part
 def _longest(w: Floats) -> float:
     """Longest step that keeps slacks and multipliers inside."""
     longest = 1e30
@@ -147,7 +147,7 @@ def _longest(w: Floats) -> float:
     return longest
 
 
-@kernel
+@part
 def _gap(w: Floats, step: float) -> float:
     """Mean complementarity after a step along the current direction."""
     total, count = 0.0, 0
@@ -161,7 +161,7 @@ def _gap(w: Floats, step: float) -> float:
     return total / count
 
 
-@kernel
+@part
 def solve_elastic_qp(qp: ElasticQP, m: int, d: Floats, multipliers: Floats) -> int:
     """Solve the program.
 

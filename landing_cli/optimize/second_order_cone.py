@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import part
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ TINY = 1e-300
 UNBOUNDED = 1e9
 
 
-@kernel
+@part
 def scaling_point(
     s0: float, s1: float, s2: float, s3: float, z0: float, z1: float, z2: float, z3: float
 ) -> tuple[float, float, float, float, float]:
@@ -48,7 +48,7 @@ def scaling_point(
     )
 
 
-@kernel
+@part
 def apply_scaling(
     v0: float, v1: float, v2: float, v3: float, beta: float, x0: float, x1: float, x2: float, x3: float
 ) -> tuple[float, float, float, float]:
@@ -57,7 +57,7 @@ def apply_scaling(
     return beta * (t * v0 - x0), beta * (t * v1 + x1), beta * (t * v2 + x2), beta * (t * v3 + x3)
 
 
-@kernel
+@part
 def apply_inverse_scaling(
     v0: float, v1: float, v2: float, v3: float, beta: float, x0: float, x1: float, x2: float, x3: float
 ) -> tuple[float, float, float, float]:
@@ -72,7 +72,7 @@ def apply_inverse_scaling(
     )
 
 
-@kernel
+@part
 def apply_inverse_scaling_squared(
     w0: float,
     w1: float,
@@ -94,7 +94,7 @@ def apply_inverse_scaling_squared(
     )
 
 
-@kernel
+@part
 def complementarity_shift(
     w: Floats,
     inverse_beta2: float,
@@ -142,7 +142,7 @@ def complementarity_shift(
     return apply_inverse_scaling(v0, v1, v2, v3, beta, x0, x1, x2, x3)
 
 
-@kernel
+@part
 def longest_step(
     s0: float, s1: float, s2: float, s3: float, d0: float, d1: float, d2: float, d3: float
 ) -> float:

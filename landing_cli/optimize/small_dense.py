@@ -7,14 +7,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import part
 
 Floats = NDArray[np.float64]
 
 SMALLEST_PIVOT = 1e-40
 
 
-@kernel
+@part
 def cholesky(matrix: Floats, n: int) -> None:
     """Factor the leading n x n block in place: its lower triangle becomes L with L L' = matrix.
 
@@ -32,7 +32,7 @@ def cholesky(matrix: Floats, n: int) -> None:
         matrix[i, i] = math.sqrt(max(total, SMALLEST_PIVOT))
 
 
-@kernel
+@part
 def cholesky_solve(factor: Floats, n: int, x: Floats) -> None:
     """Solve L L' x = x in place for the factor of :func:`cholesky`."""
     for i in range(n):

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, kernel, part
 from landing_cli.optimize.elastic_qp import new_elastic_qp, solve_elastic_qp
 
 Floats = NDArray[np.float64]
@@ -38,7 +38,7 @@ class LocalModel(NamedTuple):
     pooled: NDArray[np.bool_]  # (m,) no equality; their violation is that of the worst of them
 
 
-@kernel
+@part
 def new_local_model(n: int, m: int) -> LocalModel:
     """A zeroed model."""
     return LocalModel(
@@ -65,7 +65,7 @@ def violation(values: Floats, equality: NDArray[np.bool_], pooled: NDArray[np.bo
     return total + worst
 
 
-@kernel
+@part
 def convexify(matrix: Floats) -> None:
     """Turn negative curvature into positive curvature of the same size, in place.
 
@@ -121,7 +121,7 @@ def _rotate(A: Floats, V: Floats, p: int, q: int) -> None:
         V[k, p], V[k, q] = c * x - s * y, s * x + c * y
 
 
-@kernel
+@part
 def propose(
     model: LocalModel, m: int, price: float, radius: Floats, step: Floats, multipliers: Floats
 ) -> float:
@@ -190,7 +190,7 @@ def propose(
     return expected
 
 
-@kernel
+@part
 def add_secant(change: Floats, step: Floats, estimate: Floats) -> None:
     """Symmetric rank-one update, so that ``estimate`` maps ``step`` to ``change``."""
     n = step.shape[0]

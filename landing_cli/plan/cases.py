@@ -128,7 +128,5 @@ def _start_acceleration(section: PlanSection, asteroid: Asteroid, start: FloatAr
         return np.array(given)
     coasting = np.zeros((1, 3))
     field, v = asteroid.gravity, np.array([section.initial_state.velocity_m_s])
-    natural_accelerations(
-        int(field.kind), field.params, asteroid.rotation_rate_rad_s, start[None], v, coasting
-    )
+    natural_accelerations(field.kind, field.params, asteroid.rotation_rate_rad_s, start[None], v, coasting)
     return coasting[0]

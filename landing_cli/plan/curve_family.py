@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration
+from landing_cli.body.gravity.models import number_of
 from landing_cli.body.gravity.point_mass import point_acceleration
 from landing_cli.flight.bezier_curve import bezier_basis, first_control_points, last_control_points
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 from landing_cli.plan.guide_points import DEGREE, GuidePlane
 from landing_cli.plan.records import PlanCase
 
@@ -123,7 +124,7 @@ def _basis(samples: int, order: int) -> FloatArray:
 
 @kernel
 def fill_costs(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     family: CurveFamily,
     departure: FloatArray,
@@ -139,8 +140,8 @@ def fill_costs(
 
     Parameters
     ----------
-    kind : int
-        Gravity model, a ``GravityKind``.
+    kind : GravityKind
+        Gravity model to fly in.
     params : (p,) float, SI
         Parameters of the gravity model.
     family : CurveFamily
@@ -182,14 +183,19 @@ def fill_costs(
                 peak[j] = max(peak[j], before[j])
 
 
-@kernel
+@part
 def _fill_pull(
-    kind: int, params: FloatArray, p: FloatArray, alpha: FloatArray, beta: FloatArray, pull: FloatArray
+    kind: GravityKind,
+    params: FloatArray,
+    p: FloatArray,
+    alpha: FloatArray,
+    beta: FloatArray,
+    pull: FloatArray,
 ) -> None:
     """Write the gravity (3, m) on every curve at one time; a point mass apart, without a branch inside."""
     p00, p01, p02, p10, p11, p12 = p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2]
     p20, p21, p22 = p[2, 0], p[2, 1], p[2, 2]
-    if kind == _POINT_MASS:
+    if number_of(kind) == _POINT_MASS:
         gm = params[0]
         for j in range(alpha.shape[0]):
             x = p00 + alpha[j] * p10 + beta[j] * p20
@@ -204,7 +210,7 @@ def _fill_pull(
             pull[0, j], pull[1, j], pull[2, j] = acceleration(kind, params, x, y, z)
 
 
-@kernel
+@part
 def fill_path(position: FloatArray, alpha: float, beta: float, path: FloatArray) -> None:
     """Write the positions of one curve of a family.
 

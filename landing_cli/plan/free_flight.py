@@ -237,7 +237,7 @@ def cone_matrix(case: PlanCase) -> FloatArray:
 def _natural_at_site(case: PlanCase) -> FloatArray:
     field, w = case.asteroid.gravity, case.asteroid.rotation_rate_rad_s
     state = (*case.site.position_m, *case.landing_velocity_m_s)
-    return np.array(natural_acceleration(int(field.kind), field.params, w, *state))
+    return np.array(natural_acceleration(field.kind, field.params, w, *state))
 
 
 def _terminal(flight: FreeFlight, pick: sparse.csr_array) -> list[ConeBlock]:

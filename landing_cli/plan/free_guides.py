@@ -207,7 +207,7 @@ def _thrust(guides: FreeGuides, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     r, v, a = (basis @ control_points(guides, x) for basis in bases)
     field, w = case.asteroid.gravity, case.asteroid.rotation_rate_rad_s
     natural = np.zeros_like(r)
-    natural_accelerations(int(field.kind), field.params, w, r, v, natural)
+    natural_accelerations(field.kind, field.params, w, r, v, natural)
     by_r = gradients(field, r) + np.diag([w * w, w * w, 0.0])
     by_v = np.array([[0.0, 2.0 * w, 0.0], [-2.0 * w, 0.0, 0.0], [0.0, 0.0, 0.0]])
     free = [basis[:, 3 : n - 2] for basis in bases]

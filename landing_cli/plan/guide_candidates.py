@@ -201,7 +201,7 @@ def price(
     else:
         more = np.zeros((0, 3, alpha.size))
     fill_costs(
-        int(field.kind),
+        field.kind,
         field.params,
         search.curves,
         more,

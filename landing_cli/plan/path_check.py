@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import TOUCHDOWN_TOLERANCE_M, signed_distance_from
 from landing_cli.body.vertex_distance import vertex_distance
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ KEPT, TOO_CLOSE, CUTS = 0, 1, 2
 """Verdicts of `check_path`: every sample is clear, one is not, one after the cone entry is in the body."""
 
 
-@kernel
+@part
 def cone_entry(path: FloatArray, apex: FloatArray, axis: FloatArray, half_angle: float) -> int:
     """First sample from which a path stays in the safety cone to its end (Lyu 2026, eq 3).
 
@@ -47,7 +47,7 @@ def cone_entry(path: FloatArray, apex: FloatArray, axis: FloatArray, half_angle:
     return 0
 
 
-@kernel
+@part
 def check_path(
     surface: SurfaceIndex, by_vertices: bool, path: FloatArray, entry: int, clearance: float
 ) -> tuple[int, float, int]:

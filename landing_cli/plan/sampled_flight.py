@@ -82,7 +82,7 @@ def _on_curve(
     r, v, a = curve_states(leg.points_m, leg.duration_s, t / leg.duration_s)
     u = np.zeros_like(r)
     field = case.asteroid.gravity
-    natural_accelerations(int(field.kind), field.params, case.asteroid.rotation_rate_rad_s, r, v, u)
+    natural_accelerations(field.kind, field.params, case.asteroid.rotation_rate_rad_s, r, v, u)
     u = a - u
     return r, v, u, _cumulative(np.linalg.norm(u, axis=1), t[1] - t[0])
 

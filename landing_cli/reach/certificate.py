@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.bounds import largest_acceleration_outside
 from landing_cli.body.gravity.surface_bound import largest_acceleration_on_mesh
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 from landing_cli.optimize.conic_records import Model, Point
 from landing_cli.reach.descent_model import Layout
 from landing_cli.reach.planes import Cuts
@@ -77,7 +77,7 @@ def gravity_tube(scaled: ScaledCase, bounds: GravityBounds) -> Floats:
     return outside[np.maximum(shell, 0)]
 
 
-@kernel
+@part
 def _drift_work(case: ScaledCase, target: Floats, q: Floats, p: Floats) -> float:
     """-lambda' E for the drift without gravity: E_r = r_c - r0 - v0, E_v = w x r_c - v0."""
     r, v = case.position, case.velocity
@@ -87,7 +87,7 @@ def _drift_work(case: ScaledCase, target: Floats, q: Floats, p: Floats) -> float
     return total - case.spin * (p[1] * target[0] - p[0] * target[1])
 
 
-@kernel
+@part
 def _plane_work(
     case: ScaledCase, multiplier: Floats, cuts: Cuts, planes: int, level: float, h: float
 ) -> float:
@@ -101,7 +101,7 @@ def _plane_work(
     return total
 
 
-@kernel
+@part
 def _descent_integrals(
     case: ScaledCase, tube: Floats, multiplier: Floats, cuts: Cuts, planes: int
 ) -> tuple[float, float]:
@@ -132,7 +132,7 @@ def _descent_integrals(
     return by_thrust, by_gravity
 
 
-@kernel
+@part
 def _dual_feasible(
     case: ScaledCase, model: Model, multiplier: Floats, n_rows: int, cone_dual: Floats, duals: Floats
 ) -> None:

@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration_and_gradient, curvature
 from landing_cli.flight.extremal import ExtremalScale, rates_in_gravity, thrust_ratio
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, kernel, part
 
 Floats = NDArray[np.float64]
 
@@ -43,13 +44,13 @@ class Extremal(NamedTuple):
 class Field(NamedTuple):
     """Gravity and scales of a descent."""
 
-    kind: int
+    kind: GravityKind
     params: Floats
     scale: ExtremalScale
     inverse_axes: Floats  # (3,) of the keep-out ellipsoid, scaled
 
 
-@kernel
+@part
 def new_extremal(n_steps: int) -> Extremal:
     """Room for an extremal of ``n_steps`` steps before splitting."""
     size = n_steps + MAX_SPLITS
@@ -61,7 +62,7 @@ def new_extremal(n_steps: int) -> Extremal:
     )
 
 
-@kernel
+@part
 def gravity_point(field: Field, y: Floats) -> tuple[float, float, float]:
     """Where gravity is evaluated, m: the position, or its projection out of the ellipsoid's core."""
     w = field.inverse_axes
@@ -82,7 +83,7 @@ def _rates(field: Field, saturated: bool, y: Floats, out: Floats) -> None:
     out[14] = 0.5 * u * u
 
 
-@kernel
+@part
 def _step(
     field: Field, saturated: bool, h: float, y: Floats, rate: Floats, stage: Floats, out: Floats
 ) -> float:
@@ -131,7 +132,7 @@ def _step_to_switch(
     return h
 
 
-@kernel
+@part
 def fly_extremal(field: Field, n_steps: int, extremal: Extremal) -> int:
     """Integrate from ``extremal.state[0]`` over unit time.
 
@@ -241,7 +242,7 @@ def _tangent_rates(field: Field, saturated: bool, y: Floats, X: Floats, rate: Fl
         D[14, j] = u * du
 
 
-@kernel
+@part
 def tangents(field: Field, extremal: Extremal, n: int, X: Floats, node_tangents: Floats) -> None:
     """Derivatives of a flown extremal with respect to its initial costates.
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import path_clearance
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, kernel, part
 from landing_cli.kernel_record import by_reference
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
 from landing_cli.reach.scaled_case import ScaledCase, least_between
@@ -74,7 +74,7 @@ def new_deliveries(size: int) -> Deliveries:
     return Deliveries(np.full((size, len(VALUE_COLUMNS)), np.nan), np.full((size, 7), np.nan))
 
 
-@kernel
+@part
 def _to_body(case: ScaledCase, samples: Floats, path_m: Floats) -> float:
     """Fill body-frame positions, m; return the least r' Re r - 1 of the descent."""
     steps = samples.shape[0] - 1

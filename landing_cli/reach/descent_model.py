@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 from landing_cli.optimize.conic_ipm import fill_row_pull
 from landing_cli.optimize.conic_records import Model, Point
 from landing_cli.reach.planes import Cuts, arc_weights, refresh_planes
@@ -65,7 +65,7 @@ def layout(
     return Layout(n_equal, n_cuts, n_rows, n_cones, energy_weight, tau_free, level, n_walls)
 
 
-@kernel
+@part
 def fill_handover_rows(case: ScaledCase, model: Model) -> None:
     """Constant derivatives of the six matching rows with respect to y."""
     spin = case.spin
@@ -83,7 +83,7 @@ def fill_handover_rows(case: ScaledCase, model: Model) -> None:
     model.row_y[4, 4] -= spin * r_s
 
 
-@kernel
+@part
 def fill_arc_cones(case: ScaledCase, model: Model) -> None:
     """Constant derivatives of the final stage's thrust with respect to (a_e, a_s).
 
@@ -106,7 +106,7 @@ def fill_arc_cones(case: ScaledCase, model: Model) -> None:
                 A[2, c] += 2.0 * spin * v
 
 
-@kernel
+@part
 def fill_glide_cones(case: ScaledCase, normal: Floats, model: Model) -> None:
     """Glide slope at handover (2 a_e + a_s) and at touchdown (a_e), about the facet normal."""
     first = case.arc_fractions.shape[0]
@@ -134,7 +134,7 @@ def fill_glide_cones(case: ScaledCase, normal: Floats, model: Model) -> None:
                     A[i, 1 + c] = scale * frame[i][c]
 
 
-@kernel
+@part
 def fill_energy(case: ScaledCase, rho: float, model: Model) -> None:
     """Hessian of rho J in y: J2 = T/6 (|a_e|^2 + a_e . a_s + |a_s|^2)."""
     weight = rho * case.final_time / 6.0
@@ -144,7 +144,7 @@ def fill_energy(case: ScaledCase, rho: float, model: Model) -> None:
         model.y_hessian[1 + i, 4 + i] = model.y_hessian[4 + i, 1 + i] = weight
 
 
-@kernel
+@part
 def handover_point(case: ScaledCase, target: Floats, y: Floats) -> tuple[float, float, float]:
     """Handover position of the final arc, solver axes."""
     _, _, r_e, r_s, _, _ = arc_weights(1.0, case.final_time)
@@ -155,7 +155,7 @@ def handover_point(case: ScaledCase, target: Floats, y: Floats) -> tuple[float, 
     )
 
 
-@kernel
+@part
 def refresh_arc(case: ScaledCase, target: Floats, handover_mass: float, model: Model, y: Floats) -> float:
     """Gravity and mass along the final arc; returns the mass at touchdown.
 
@@ -192,7 +192,7 @@ def refresh_arc(case: ScaledCase, target: Floats, handover_mass: float, model: M
     return mass
 
 
-@kernel
+@part
 def _refresh_matching(case: ScaledCase, target: Floats, path: Path, model: Model, y: Floats) -> None:
     """Values and thrust derivatives of the six matching rows."""
     n = path.gradient.shape[0]
@@ -213,7 +213,7 @@ def _refresh_matching(case: ScaledCase, target: Floats, path: Path, model: Model
         model.row_end[r] = n
 
 
-@kernel
+@part
 def _refresh_handover_on_ellipsoid(case: ScaledCase, target: Floats, model: Model, point: Point) -> None:
     """Row 6: the handover on the ellipsoid, |xi(r_p)| = 1, linearised in y.
 
@@ -240,7 +240,7 @@ def _refresh_handover_on_ellipsoid(case: ScaledCase, target: Floats, model: Mode
                     )
 
 
-@kernel
+@part
 def _refresh_approach(case: ScaledCase, target: Floats, model: Model, y: Floats, r: int) -> None:
     """Row r: an ellipsoid is reached from outside, -n . v_p >= 0, in the rotating frame.
 
@@ -263,7 +263,7 @@ def _refresh_approach(case: ScaledCase, target: Floats, model: Model, y: Floats,
         model.row_value[r] -= normal[i] * (v_e * y[1 + i] + v_s * y[4 + i])
 
 
-@kernel
+@part
 def _refresh_propellant(
     case: ScaledCase, point: Point, path: Path, model: Model, r: int, touchdown_mass: float
 ) -> None:
@@ -299,7 +299,7 @@ def _refresh_propellant(
             model.row_y[r, a] -= flow * touchdown_mass * case.final_time * width * along
 
 
-@kernel
+@part
 def _add_mass_gradient(case: ScaledCase, point: Point, path: Path, model: Model) -> float:
     """Gradient through the mass: -c h lambda_m F / |F|, the mass costate carried back from the handover.
 

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, kernel, part
 from landing_cli.reach.free_batch import CutBatch
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level, least_between
 from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
@@ -25,7 +25,7 @@ Ints = NDArray[np.int64]
 UNDECIDED = 0.1
 
 
-@kernel
+@part
 def last_cut_node(case: ScaledCase, position: Floats) -> int:
     """Last node that may carry a tangent plane: the handover has a row of its own when on the ellipsoid."""
     n = position.shape[0] - 1
@@ -65,7 +65,7 @@ def lowest_level_between(case: ScaledCase, thrust: Floats, samples: Floats) -> f
     return lowest
 
 
-@kernel
+@part
 def _unit_coordinates(case: ScaledCase, k: int, x: Floats, xi: Floats) -> None:
     """Xi of a solver-axes position at node k."""
     c, s = case.node_cos[k], case.node_sin[k]
@@ -88,7 +88,7 @@ def _dot(u: Floats, v: Floats) -> float:
     return float(u[0] * v[0] + u[1] * v[1] + u[2] * v[2])
 
 
-@kernel
+@part
 def _dip(case: ScaledCase, position: Floats) -> tuple[int, int, int]:
     """Nodes before the entry, after the exit, and at the deepest point of a path's dip."""
     n = last_cut_node(case, position)

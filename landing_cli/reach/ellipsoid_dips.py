@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import part
 from landing_cli.reach.costate_dynamics import COLUMNS, Extremal
 
 Floats = NDArray[np.float64]
@@ -23,7 +23,7 @@ FAR = 1.2
 STEP, FRACTION, LEVEL, BEND = range(4)
 
 
-@kernel
+@part
 def level_and_gradient(inverse_axes: Floats, r: Floats, normal: Floats) -> float:
     """|xi| = sqrt(r' Re r), and its gradient into ``normal``."""
     level2 = 0.0
@@ -35,7 +35,7 @@ def level_and_gradient(inverse_axes: Floats, r: Floats, normal: Floats) -> float
     return level
 
 
-@kernel
+@part
 def add_level_bend(inverse_axes: Floats, level: float, normal: Floats, weight: float, K: Floats) -> None:
     """Add ``weight`` times the Hessian of |xi| to the leading 3 x 3 block."""
     for i in range(3):
@@ -44,13 +44,13 @@ def add_level_bend(inverse_axes: Floats, level: float, normal: Floats, weight: f
             K[i, j] -= weight * normal[i] * normal[j] / level
 
 
-@kernel
+@part
 def new_dips() -> Floats:
     """Room for the dips of one path, (MAX_DIPS, 4)."""
     return np.zeros((MAX_DIPS, 4))
 
 
-@kernel
+@part
 def hermite(f: float) -> tuple[float, float, float, float, float, float, float, float]:
     """Cubic Hermite weights of (r0, h v0, r1, h v1) for the value and for h times the rate at f in [0, 1]."""
     g = 1.0 - f
@@ -66,7 +66,7 @@ def hermite(f: float) -> tuple[float, float, float, float, float, float, float, 
     )
 
 
-@kernel
+@part
 def interpolate(h: float, f: float, before: Floats, after: Floats, r: Floats, v: Floats) -> None:
     """Position and velocity within a step, from the states at its ends."""
     a, b, c, d, ta, tb, tc, td = hermite(f)
@@ -75,7 +75,7 @@ def interpolate(h: float, f: float, before: Floats, after: Floats, r: Floats, v:
         v[i] = (ta * before[i] + tc * after[i]) / h + tb * before[3 + i] + td * after[3 + i]
 
 
-@kernel
+@part
 def find_dips(inverse_axes: Floats, extremal: Extremal, n: int, dips: Floats) -> int:
     """Find where the path comes near the ellipsoid and leaves again; returns how many places.
 
@@ -111,12 +111,12 @@ def find_dips(inverse_axes: Floats, extremal: Extremal, n: int, dips: Floats) ->
     return count
 
 
-@kernel
+@part
 def _dot3(a: Floats, b: Floats, offset: int) -> float:
     return a[0] * b[offset] + a[1] * b[offset + 1] + a[2] * b[offset + 2]
 
 
-@kernel
+@part
 def dip_row(
     inverse_axes: Floats,
     extremal: Extremal,

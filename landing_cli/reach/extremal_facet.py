@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, kernel, part
 from landing_cli.optimize.sqp import (
     LocalModel,
     add_secant,
@@ -99,13 +99,13 @@ class Ended(NamedTuple):
     broken: float
 
 
-@kernel
+@part
 def new_flight(n_steps: int) -> Flight:
     """Room for one extremal."""
     return Flight(new_extremal(n_steps), new_dips(), np.zeros(MAX_ROWS))
 
 
-@kernel
+@part
 def new_search(problem: ExtremalProblem, n_steps: int) -> Search:
     """Work space for the facets of one case, flown with ``n_steps`` steps."""
     model = new_local_model(N, MAX_ROWS)
@@ -124,7 +124,7 @@ def new_search(problem: ExtremalProblem, n_steps: int) -> Search:
     )
 
 
-@kernel
+@part
 def start_extremal(problem: ExtremalProblem, costates: Floats, extremal: Extremal) -> None:
     """Set the initial state and costates."""
     y = extremal.state[0]

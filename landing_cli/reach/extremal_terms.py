@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.gravity.kernels import acceleration_and_gradient
 from landing_cli.flight.extremal import extremal_scale
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, kernel, part
 from landing_cli.reach.costate_dynamics import Field, gravity_point
 from landing_cli.reach.ellipsoid_dips import MAX_DIPS, add_level_bend, level_and_gradient
 from landing_cli.reach.records import LandingCase
@@ -78,7 +78,7 @@ def extremal_problem(case: LandingCase) -> ExtremalProblem:
     inverse_axes = scale.length_m / np.array(case.ellipsoid_m, dtype=np.float64)
     bound = craft.propellant_kg
     return ExtremalProblem(
-        field=Field(int(gravity.kind), gravity.params, scale, inverse_axes),
+        field=Field(gravity.kind, gravity.params, scale, inverse_axes),
         position=np.array(case.position_m, dtype=np.float64) / scale.length_m,
         velocity=np.array(case.velocity_m_s, dtype=np.float64) * scale.time_s / scale.length_m,
         final_time=case.final_stage_s / case.descent_s,
@@ -90,7 +90,7 @@ def extremal_problem(case: LandingCase) -> ExtremalProblem:
     )
 
 
-@kernel
+@part
 def with_guard(problem: ExtremalProblem, guard: float) -> ExtremalProblem:
     """Return the problem with another guard of the thrust bound."""
     p = problem
@@ -107,7 +107,7 @@ def with_guard(problem: ExtremalProblem, guard: float) -> ExtremalProblem:
     )
 
 
-@kernel
+@part
 def _arc_weights(sigma: float, T: float) -> tuple[float, float, float, float, float, float]:
     """Weights of (d, v), offset and velocity at handover, in a*, r - r_c and v at time-to-go sigma T."""
     s2 = sigma * sigma
@@ -121,7 +121,7 @@ def _arc_weights(sigma: float, T: float) -> tuple[float, float, float, float, fl
     )
 
 
-@kernel
+@part
 def _arc_acceleration(
     problem: ExtremalProblem, target: Floats, x: Floats, sigma: float, star: Floats, D: Floats
 ) -> None:
@@ -165,7 +165,7 @@ def _arc_thrust(
         D[1, c] += 2.0 * w * of_v
 
 
-@kernel
+@part
 def _norm_and_slope(vector: Floats, D: Floats, slope: Floats) -> float:
     """Norm of a vector, and the norm's derivative (6,) from the vector's."""
     norm = max(math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2), 1e-9)
@@ -174,7 +174,7 @@ def _norm_and_slope(vector: Floats, D: Floats, slope: Floats) -> float:
     return norm
 
 
-@kernel
+@part
 def final_energy(problem: ExtremalProblem, target: Floats, x: Floats, gradient: Floats) -> float:
     """J2 of the final arc, and its gradient (7,) with respect to the handover state."""
     T = problem.final_time
@@ -225,7 +225,7 @@ def _thrust_rows(
         jacobian[ROW_PROPELLANT, a] = d_mass[a]
 
 
-@kernel
+@part
 def handover_rows(
     problem: ExtremalProblem,
     target: Floats,
@@ -243,7 +243,7 @@ def handover_rows(
         jacobian[ROW_HANDOVER, a] = normal[a] if a < 3 else 0.0
 
 
-@kernel
+@part
 def glide_weights(end: int, T: float) -> tuple[float, float]:
     """Weights of (d, v) in the two directions that the cone must hold: 2 a_e + a_s, then a_e."""
     return (6.0 / (T * T), 0.0) if end == 0 else (6.0 / (T * T), 2.0 / T)
@@ -275,7 +275,7 @@ def _glide_rows(
             jacobian[row, i], jacobian[row, 3 + i] = wd * slope, wv * slope
 
 
-@kernel
+@part
 def handover_hessian(
     problem: ExtremalProblem, target: Floats, x: Floats, multipliers: Floats, K: Floats
 ) -> None:

@@ -17,8 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration
-from landing_cli.kernel import kernel
+from landing_cli.kernel import part
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +37,7 @@ class ArcMeasures(NamedTuple):
     glide_angle_rad: float  # largest angle of r - r_c to the facet normal
 
 
-@kernel
+@part
 def end_accelerations(
     rx: float, ry: float, rz: float, vx: float, vy: float, vz: float, duration_s: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -57,7 +58,7 @@ def end_accelerations(
     )
 
 
-@kernel
+@part
 def arc_state(
     a: tuple[float, float, float, float, float, float], target: Floats, duration_s: float, s: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -80,14 +81,14 @@ def arc_state(
     )
 
 
-@kernel
+@part
 def _angle(x: float, y: float, z: float, normal: Floats) -> float:
     along = x * normal[0] + y * normal[1] + z * normal[2]
     square = x * x + y * y + z * z
     return math.atan2(math.sqrt(max(square - along * along, 0.0)), along)
 
 
-@kernel
+@part
 def measure_arc(
     handover: Floats,
     handover_mass: float,
@@ -96,7 +97,7 @@ def measure_arc(
     duration_s: float,
     spin: float,
     exhaust_velocity: float,
-    kind: int,
+    kind: GravityKind,
     params: Floats,
     points: Floats,
 ) -> ArcMeasures:
@@ -112,7 +113,7 @@ def measure_arc(
         Touchdown point (m) and outward unit normal of its facet.
     duration_s, spin, exhaust_velocity : float, s, rad/s, m/s
         Final stage's duration, spin rate, effective exhaust velocity.
-    kind, params : int, (p,) float
+    kind, params : GravityKind, (p,) float
         The gravity field.
     points : (ARC_SAMPLES + 1, 3) float
         Filled with positions from the handover to touchdown, m.

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, kernel, part
 from landing_cli.kernel_record import by_reference
 from landing_cli.optimize.conic_ipm import advance, residuals
 from landing_cli.optimize.conic_records import Model, Point, Step, new_model, new_point, new_step
@@ -148,7 +148,7 @@ def cold_start(case: ScaledCase, target: Floats, normal: Floats, plan: Layout, s
         point.cone_dual[j, 0] = 0.1 * scale
 
 
-@kernel
+@part
 def _certificate(
     case: ScaledCase,
     target: Floats,

@@ -1,12 +1,13 @@
 """The compiled kernels: whether they are in the cache, and their first compilation.
 
 Most of a compilation is numba's own work in Python, which threads cannot share. Forked copies of the process
-can: each compiles a part, and what it leaves in the cache on disk is linked, not compiled, by the next.
+can: each compiles some, and what it leaves in the cache on disk is linked, not compiled, by the next.
 """
 
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -24,10 +25,19 @@ from landing_cli.reach.certificate import GravityBounds, certified_thrust_level,
 from landing_cli.reach.delivery import deliver_many, new_deliveries
 from landing_cli.reach.descent_model import layout, refresh
 from landing_cli.reach.ellipsoid_arcs import arc_cuts_many, freeze_many, lowest_levels, lowest_levels_between
-from landing_cli.reach.free_batch import keep_costates, keep_pressure, no_cuts, solve_many
+from landing_cli.reach.free_batch import (
+    keep_costates,
+    keep_pressure,
+    new_batch,
+    no_cuts,
+    no_walls,
+    solve_many,
+)
 from landing_cli.reach.free_descent import PreparedCase, Surroundings, prepare, survey
 from landing_cli.reach.free_solve import Solver, cold_start, new_solver
 from landing_cli.reach.records import LandingCase
+
+PATIENCE_S, TICK_S = 60.0, 0.02  # of what waits for kernels that another process compiles
 
 
 def are_compiled(descent: str, terrain: str = "report") -> bool:
@@ -51,9 +61,9 @@ def are_compiled(descent: str, terrain: str = "report") -> bool:
 
 
 def compile_parts(case: LandingCase) -> None:
-    """Compile, on all processors, what the kernels of a case are made of.
+    """Compile, on all processors, the kernels of a case.
 
-    The parts are called with numbers of no meaning, once. What joins them compiles when a facet is solved.
+    They are called with numbers of no meaning, once. Whatever else there is compiles when a facet is solved.
 
     Parameters
     ----------
@@ -66,8 +76,17 @@ def compile_parts(case: LandingCase) -> None:
         build_surface_index(mesh), facet_centroids(mesh), facet_normals(mesh), mean_edge_m(mesh), unbound
     )
     prepared = prepare(case, shared)
-    # gravity comes with the survey: where two begin together, the other does not need it
-    parts = [_conic, lambda _: survey(case), _flight, _delivery, _certificates, _answers, _ellipsoid_arcs]
+    # what the solve joins comes before it, so that it waits little; the longest first
+    parts = [
+        _flight,
+        _conic,
+        _certificates,
+        _answers,
+        _delivery,
+        _solve,
+        _ellipsoid_arcs,
+        lambda _: survey(case),
+    ]
     if case.descent == "extremal":
         parts.insert(2, _extremals)
     if case.terrain == "require":
@@ -149,6 +168,26 @@ def _terrain(prepared: PreparedCase) -> None:
     surface, point = prepared.shared.surface, np.ones((1, 3))
     signed_distances_into(surface, point, np.zeros(1), np.zeros(1, dtype=np.int64))
     first_hits_into(surface, point, point, np.zeros(1), np.zeros(1, dtype=np.int64))
+
+
+def _solve(prepared: PreparedCase) -> None:
+    """The whole solve, once the kernels that it links are compiled."""
+    linked = (
+        cold_start,
+        refresh,
+        advance,
+        residuals,
+        certified_thrust_level,
+        linearised_thrust_level,
+        keep_costates,
+        keep_pressure,
+    )
+    patience = time.monotonic() + PATIENCE_S
+    while not all(is_cached(kernel) for kernel in linked) and time.monotonic() < patience:
+        time.sleep(TICK_S)
+    case, one, n = prepared.coarse, np.ones((1, 3)), len(prepared.coarse.mid_cos)
+    batch = no_cuts(1, n), np.ones(1), no_walls(1), 1.0, True, 1, 1
+    solve_many(case, one, one, *batch, prepared.coarse_tube, 1.0, False, _solver(prepared), new_batch(1, n))
 
 
 def _extremals(prepared: PreparedCase) -> None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import part
 from landing_cli.kernel_record import by_reference
 from landing_cli.optimize.conic_records import Model
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal
@@ -34,7 +34,7 @@ def new_cuts(size: int) -> Cuts:
     return Cuts(np.zeros(size, dtype=np.int64), np.zeros((size, 3)), np.zeros(size), np.zeros(size))
 
 
-@kernel
+@part
 def arc_weights(sigma: float, final_time: float) -> tuple[float, float, float, float, float, float]:
     """Weights of (a_e, a_s) in a*, in r - r_c, and in v at time-to-go sigma T.
 
@@ -53,7 +53,7 @@ def arc_weights(sigma: float, final_time: float) -> tuple[float, float, float, f
     )
 
 
-@kernel
+@part
 def _refresh_on_arc(
     case: ScaledCase, target: Floats, model: Model, cuts: Cuts, c: int, r: int, y: Floats
 ) -> None:
@@ -67,7 +67,7 @@ def _refresh_on_arc(
     model.row_value[r] = value
 
 
-@kernel
+@part
 def refresh_planes(
     case: ScaledCase,
     target: Floats,

@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration, acceleration_and_gradient
-from landing_cli.kernel import kernel
+from landing_cli.kernel import part
 from landing_cli.kernel_record import by_reference
 from landing_cli.reach.records import LandingCase
 
@@ -46,7 +47,7 @@ class ScaledCase(NamedTuple):
     arc_share: float  # share of the thrust bound that the final stage may use
     compensated: bool
     on_ellipsoid: bool
-    gravity_kind: int
+    gravity_kind: GravityKind
     gravity_params: Floats
     length_m: float
     acceleration_m_s2: float
@@ -85,7 +86,7 @@ def scale_case(case: LandingCase, n_intervals: int) -> ScaledCase:
         arc_share=1.0,
         compensated=case.final_stage_thrust == "compensated",
         on_ellipsoid=case.handover == "on_ellipsoid",
-        gravity_kind=int(case.asteroid.gravity.kind),
+        gravity_kind=case.asteroid.gravity.kind,
         gravity_params=case.asteroid.gravity.params.copy(),  # writable, as it comes out of a pickle
         length_m=length,
         acceleration_m_s2=a0,
@@ -96,7 +97,7 @@ def scale_case(case: LandingCase, n_intervals: int) -> ScaledCase:
     )
 
 
-@kernel
+@part
 def core_scale(case: ScaledCase, x: float, y: float, z: float) -> float:
     """Metres per unit of length, more where a body-frame point lies in the ellipsoid's core."""
     a, b, c = x * case.inverse_axes[0], y * case.inverse_axes[1], z * case.inverse_axes[2]
@@ -106,7 +107,7 @@ def core_scale(case: ScaledCase, x: float, y: float, z: float) -> float:
     return case.length_m * CORE / math.sqrt(level + 1e-30)
 
 
-@kernel
+@part
 def gravity_and_gradient(
     case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
@@ -137,7 +138,7 @@ def gravity_and_gradient(
     )
 
 
-@kernel
+@part
 def gravity_in_space(
     case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float
 ) -> tuple[float, float, float]:
@@ -149,7 +150,7 @@ def gravity_in_space(
     return p * (cosine * ax - sine * ay), p * (sine * ax + cosine * ay), p * az
 
 
-@kernel
+@part
 def gravity_on_arc(case: ScaledCase, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Gravity at a point of the final arc, scaled, body axes; arcs may fly deep in the ellipsoid."""
     L, p = case.length_m, 1.0 / case.acceleration_m_s2
@@ -157,7 +158,7 @@ def gravity_on_arc(case: ScaledCase, x: float, y: float, z: float) -> tuple[floa
     return p * ax, p * ay, p * az
 
 
-@kernel
+@part
 def ellipsoid_level(case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float) -> float:
     """|xi| = sqrt(r' Re r) of a point in solver axes: 1 on the ellipsoid, homogeneous of degree 1."""
     a = (cosine * x + sine * y) * case.inverse_axes[0]
@@ -166,7 +167,7 @@ def ellipsoid_level(case: ScaledCase, cosine: float, sine: float, x: float, y: f
     return math.sqrt(a * a + b * b + c * c)
 
 
-@kernel
+@part
 def least_between(first: float, middle: float, last: float) -> float:
     """Least value of the parabola through three evenly spaced values, between the outer two."""
     slope, bend = 0.5 * (last - first), 0.5 * (first + last) - middle
@@ -175,7 +176,7 @@ def least_between(first: float, middle: float, last: float) -> float:
     return min(first, middle, last)
 
 
-@kernel
+@part
 def ellipsoid_normal(
     case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float
 ) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 from landing_cli.kernel_record import by_reference
 from landing_cli.reach.scaled_case import ScaledCase, gravity_and_gradient, gravity_in_space
 
@@ -90,7 +90,7 @@ def fly(case: ScaledCase, thrust: Floats, path: Path) -> None:
         path.velocity[n, i] += path.defect[3 + i]
 
 
-@kernel
+@part
 def pull_back(
     path: Path, end: int, p0: float, p1: float, p2: float, q0: float, q1: float, q2: float, row: Floats
 ) -> tuple[float, float, float, float, float, float]:
@@ -133,7 +133,7 @@ def pull_back(
     return p0, p1, p2, q0, q1, q2
 
 
-@kernel
+@part
 def fly_accurately(case: ScaledCase, thrust: Floats, samples: Floats) -> None:
     """Fly the descent stage by Runge-Kutta 4, with exact mass, in the same number of steps an interval.
 
@@ -193,7 +193,7 @@ def fly_accurately(case: ScaledCase, thrust: Floats, samples: Floats) -> None:
                 samples[row, i] = s[i]
 
 
-@kernel
+@part
 def measure_defect(case: ScaledCase, thrust: Floats, path: Path) -> None:
     """Set ``path.defect`` to what an accurate flight of ``thrust`` adds to :func:`fly`'s end state."""
     n = thrust.shape[0]

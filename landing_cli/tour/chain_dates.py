@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.flight.astronomy import DAY_S
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 from landing_cli.tour.chain_kernel import Bounds, FirstLegs, Scratch, chain_cost
 from landing_cli.tour.ephemeris import Ephemeris
 
@@ -178,7 +178,7 @@ def improve_dates(
     )
 
 
-@kernel
+@part
 def update_inverse(
     inverse: FloatArray,
     work: FloatArray,

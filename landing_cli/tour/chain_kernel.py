@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from landing_cli.flight.astronomy import DAY_S, GM_SUN_M3_S2
 from landing_cli.flight.kepler import kepler_state
-from landing_cli.kernel import kernel
+from landing_cli.kernel import part
 from landing_cli.kernel_record import by_reference
 from landing_cli.tour.ephemeris import EARTH_ROW, Ephemeris, body_positions
 from landing_cli.tour.lambert import lambert_arcs
@@ -69,7 +69,7 @@ class Scratch(NamedTuple):
     bodies: FloatArray
 
 
-@kernel
+@part
 def first_leg(
     first: FirstLegs, j: int, t_s: float, x: float, y: float, z: float, change: FloatArray, leg: FloatArray
 ) -> bool:
@@ -141,7 +141,7 @@ def first_leg(
     return False
 
 
-@kernel
+@part
 def later_leg(
     x0: float,
     y0: float,
@@ -200,7 +200,7 @@ def later_leg(
     return best
 
 
-@kernel
+@part
 def chain_cost(
     dates: FloatArray,
     length: int,

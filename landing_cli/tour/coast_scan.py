@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from landing_cli.flight.astronomy import GM_SUN_M3_S2
 from landing_cli.flight.kepler import kepler_state
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 from landing_cli.kernel_record import by_reference
 
 FloatArray = NDArray[np.float64]
@@ -70,7 +70,7 @@ def rows_of(record: Record, rows: IntArray) -> Record:
     return type(record)(*(np.ascontiguousarray(field[rows]) for field in record))
 
 
-@kernel
+@part
 def coast_from(
     state: FloatArray, burn_t_s: float, first_t_s: float, grid_t_s: FloatArray, coasts: Coasts, j: int
 ) -> None:
@@ -105,7 +105,7 @@ def coast_from(
         record_coast(probes, coasts, j, k)
 
 
-@kernel
+@part
 def record_coast(probes: FloatArray, coasts: Coasts, j: int, k: int) -> None:
     """Enter a coast's position and its sensitivity at one time.
 
@@ -233,7 +233,7 @@ def scan_targets(
                 keep_best(target[j], arrival_t_s[j], estimate_m_s[j], burn_m_s[j], i, low_t, low, l0, l1, l2)
 
 
-@kernel
+@part
 def keep_best(
     target: IntArray,
     arrival_t_s: FloatArray,

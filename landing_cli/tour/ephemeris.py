@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.errors import InputRefused
 from landing_cli.flight.astronomy import GM_SUN_M3_S2, OBLIQUITY_RAD
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 from landing_cli.kernel_record import by_reference
 from landing_cli.sources.ephemeris_kernel import EARTH, EARTH_MOON, MOON, SUN, EphemerisSpan, read_span
 
@@ -69,7 +69,7 @@ class Ephemeris(NamedTuple):
     gm_sun: float
 
 
-@kernel
+@part
 def body_positions(ephemeris: Ephemeris, t: float, ahead: float, out: FloatArray) -> None:
     """Heliocentric positions of all bodies at a time, and the acceleration of the frame.
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.flight.astronomy import OBLIQUITY_RAD
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, part
 from landing_cli.tour.ephemeris import EARTH_ROW, Ephemeris
 
 FloatArray = NDArray[np.float64]
@@ -23,7 +23,7 @@ _POLE_Y, _POLE_Z = math.sin(OBLIQUITY_RAD), math.cos(OBLIQUITY_RAD)
 _OBLATE = 1.5 * EARTH_J2 * EARTH_RADIUS_M**2
 
 
-@kernel
+@part
 def craft_acceleration(
     ephemeris: Ephemeris, bodies: FloatArray, x: float, y: float, z: float
 ) -> tuple[float, float, float]:
@@ -89,7 +89,7 @@ def first_step(ephemeris: Ephemeris, bodies: FloatArray, state: FloatArray) -> f
     return 0.2 * math.sqrt(shortest)
 
 
-@kernel
+@part
 def rounding_of(ephemeris: Ephemeris, bodies: FloatArray, state: FloatArray) -> float:
     """What the last digit of a heliocentric position is worth in acceleration.
 

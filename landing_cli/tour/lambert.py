@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 from landing_cli.tour.lambert_time import solve_x
 
 FloatArray = NDArray[np.float64]
@@ -26,7 +26,7 @@ Geometry = tuple[
 Velocities = tuple[float, float, float, float, float, float]
 
 
-@kernel
+@part
 def arc_geometry(x1: float, y1: float, z1: float, x2: float, y2: float, z2: float) -> Geometry:
     """What an arc between two positions has whatever its time of flight.
 
@@ -61,7 +61,7 @@ def arc_geometry(x1: float, y1: float, z1: float, x2: float, y2: float, z2: floa
     )  # fmt: skip
 
 
-@kernel
+@part
 def arc_velocities(mu: float, geometry: Geometry, x: float) -> Velocities:
     """Velocities at both ends of an arc (Izzo 2015, algorithm 1).
 
@@ -96,7 +96,7 @@ def arc_velocities(mu: float, geometry: Geometry, x: float) -> Velocities:
     )
 
 
-@kernel
+@part
 def lambert_arc(
     mu: float,
     x1: float,

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 _STEP = 1e-6  # the iteration is of order 4
 _ITERATIONS = 25
@@ -58,7 +58,7 @@ def time_of_flight(lam: float, rest: float, turns: int, x: float) -> float:
     return (psi / root - x + lam * y) / u
 
 
-@kernel
+@part
 def time_slopes(lam: float, rest: float, x: float, t: float) -> tuple[float, float, float]:
     """First three derivatives of T(x) (Izzo 2015, eq 22).
 
@@ -88,7 +88,7 @@ def time_slopes(lam: float, rest: float, x: float, t: float) -> tuple[float, flo
     return first, second, third
 
 
-@kernel
+@part
 def least_time(lam: float, rest: float, turns: int) -> tuple[float, float]:
     """Shortest flight with some revolutions (Izzo 2015, section 2.3), by Halley's iteration on T'(x) = 0.
 
@@ -117,7 +117,7 @@ def least_time(lam: float, rest: float, turns: int) -> tuple[float, float]:
     return x, time_of_flight(lam, rest, turns, x)
 
 
-@kernel
+@part
 def solve_x(lam: float, rest: float, t: float, turns: int, right: bool) -> float:
     """Find x for a time of flight (Izzo 2015, algorithm 2).
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.flight.elements import OrbitElements, states_of
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, kernel, part
 from landing_cli.tour.ephemeris import EARTH_ROW, MOON_ROW, Ephemeris, body_positions
 from landing_cli.tour.forces import EARTH_RADIUS_M, craft_acceleration, first_step, rounding_of
 from landing_cli.tour.radau import NODES, Radau, extrapolate, radau, state_within
@@ -52,7 +52,7 @@ REASONS = {
 _ARRIVED, _OUTSIDE, _TOO_SMALL, _HIT_EARTH, _HIT_MOON = (int(status) for status in FlightStatus)
 
 
-@kernel
+@part
 def _below_ground(bodies: FloatArray, state: FloatArray) -> int:
     """Status of a craft inside the Earth or the Moon, else arrived."""
     earth = moon = 0.0
@@ -64,7 +64,7 @@ def _below_ground(bodies: FloatArray, state: FloatArray) -> int:
     return _HIT_MOON if moon < MOON_RADIUS_M**2 else _ARRIVED
 
 
-@kernel
+@part
 def _collocate(
     ephemeris: Ephemeris,
     scheme: Radau,
@@ -132,7 +132,7 @@ def _advance(scheme: Radau, h: float, forces: FloatArray, state: FloatArray) -> 
         state[3 + axis] += h * one
 
 
-@kernel
+@part
 def fly_state(
     ephemeris: Ephemeris,
     scheme: Radau,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import part
 from landing_cli.kernel_record import by_reference
 
 FloatArray = NDArray[np.float64]
@@ -72,7 +72,7 @@ def radau() -> Radau:
     return Radau(nodes, first, second, leading, leading[:, None] * np.array(others))
 
 
-@kernel
+@part
 def extrapolate(scheme: Radau, ratio: float, forces: FloatArray, ahead: FloatArray) -> None:
     """Carry the polynomial of a step's accelerations on to the nodes of the next.
 
@@ -99,7 +99,7 @@ def extrapolate(scheme: Radau, ratio: float, forces: FloatArray, ahead: FloatArr
         ahead[n, 0], ahead[n, 1], ahead[n, 2] = sx / total, sy / total, sz / total
 
 
-@kernel
+@part
 def state_within(
     scheme: Radau, h: float, share: float, state: FloatArray, forces: FloatArray, out: FloatArray
 ) -> None:

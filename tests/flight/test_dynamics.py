@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from numpy.testing import assert_allclose
 
 from landing_cli.body.gravity.field import GravityField
@@ -11,12 +12,14 @@ from landing_cli.body.gravity.harmonics import harmonics_field
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.flight.dynamics import (
     about_z,
-    fly_nodes,
+    fly_nodes as fly_nodes_part,
     jacobi_constant,
     natural_acceleration,
     to_inertial,
     to_rotating,
 )
+
+fly_nodes = from_python(fly_nodes_part)
 
 GM = 4.892  # Bennu, m3/s2
 SPIN = 2.0 * np.pi / (4.288 * 3600.0)  # rad/s
@@ -30,7 +33,7 @@ def bennu_field() -> GravityField:
 def fly(field: GravityField, start: np.ndarray, duration: float, nodes: np.ndarray, steps: int) -> np.ndarray:
     states = np.zeros((len(nodes) * steps + 1, 7))
     states[0] = start
-    fly_nodes(int(field.kind), field.params, SPIN, EXHAUST, duration, nodes, steps, states)
+    fly_nodes(field.kind, field.params, SPIN, EXHAUST, duration, nodes, steps, states)
     return states
 
 
@@ -100,8 +103,8 @@ def test_inertial_thrust_pushes_along_a_line_that_is_fixed_at_the_end_of_the_leg
 def test_natural_acceleration_is_gravity_minus_coriolis_minus_centrifugal() -> None:
     field = bennu_field()
     r, v, w = np.array([210.0, -90.0, 260.0]), np.array([0.4, -0.2, 0.7]), np.array([0.0, 0.0, SPIN])
-    still = np.array(natural_acceleration(int(field.kind), field.params, 0.0, *r, *v))
-    got = np.array(natural_acceleration(int(field.kind), field.params, SPIN, *r, *v))
+    still = np.array(natural_acceleration(field.kind, field.params, 0.0, *r, *v))
+    got = np.array(natural_acceleration(field.kind, field.params, SPIN, *r, *v))
     fictitious = -2.0 * np.cross(w, v) - np.cross(w, np.cross(w, r))
     assert_allclose(got, still + fictitious, rtol=1e-14)
 

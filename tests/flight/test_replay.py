@@ -109,7 +109,7 @@ def test_the_fast_integrator_splits_steps_where_the_thrust_saturates() -> None:
 def test_the_extremal_conserves_its_hamiltonian() -> None:
     """H = u^2/2 + lambda . f is constant: the costate equations belong to the state equations."""
     scale = extremal_scale(20.0, MASS, EXHAUST, 500.0, SPIN)
-    kind, params = int(FIELD.kind), FIELD.params
+    kind, params = FIELD.kind, FIELD.params
 
     def hamiltonian(y: np.ndarray) -> float:
         rate = np.zeros(14)

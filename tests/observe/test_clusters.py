@@ -6,8 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from seeing_samples import landmarks_at, path_through
-from seeing_samples import observe_case as sample_case
+from seeing_samples import landmarks_at, observe_case as sample_case, path_through
 from shape_helpers import box
 
 from landing_cli.errors import InputRefused

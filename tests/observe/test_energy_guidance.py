@@ -80,7 +80,7 @@ def test_the_law_flies_the_cubic_whatever_the_field() -> None:
     v0 = np.array([0.05, -0.02, 0.03])
 
     def rates(t: float, y: np.ndarray) -> np.ndarray:
-        natural = np.array(natural_acceleration(int(field.kind), field.params, w, *y))
+        natural = np.array(natural_acceleration(field.kind, field.params, w, *y))
         return np.append(y[3:], natural + guided_acceleration(y[:3] - site, y[3:], natural, tof - t))
 
     times = np.linspace(0.0, tof - 20.0, 25)

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from scipy.integrate import solve_ivp
 from solver_samples import INNER_M, eros_case, miss_m, potato_case, reflown
 
-from landing_cli.body.gravity.kernels import acceleration_and_gradient
+from landing_cli.body.gravity.kernels import acceleration_and_gradient as acceleration_and_gradient_part
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.flight.linear_arcs import fly_linear_arcs
 from landing_cli.flight.linearised_arcs import linearised_arcs
@@ -26,6 +27,8 @@ from landing_cli.observe.path_values import control_energy
 from landing_cli.observe.records import ObserveCase, SteeringOptions
 from landing_cli.observe.transcription import least_energy_path
 from landing_cli.observe.waypoints import waypoints_of
+
+acceleration_and_gradient = from_python(acceleration_and_gradient_part)
 
 TOF = 800.0
 
@@ -93,7 +96,7 @@ def shot_energy(case: ObserveCase, path: Path, count: int) -> float:
 
     def rates(t: float, y: np.ndarray) -> np.ndarray:
         r = y[:3] * length + frame.origin_m
-        gx, gy, gz, xx, yy, zz, xy, xz, yz = acceleration_and_gradient(int(field.kind), field.params, *r)
+        gx, gy, gz, xx, yy, zz, xy, xz, yz = acceleration_and_gradient(field.kind, field.params, *r)
         slope = TOF**2 * np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) + centrifugal
         u = -0.5 * y[9:12]
         a = np.array([gx, gy, gz]) * TOF**2 / length + centrifugal @ r / length + coriolis @ y[3:6] + u

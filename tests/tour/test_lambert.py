@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from numpy.testing import assert_allclose
 
 from landing_cli.flight.astronomy import AU_M, DAY_S, GM_SUN_M3_S2
 from landing_cli.flight.elements import elements_of_catalogue, states_of
 from landing_cli.flight.kepler import propagate_kepler
 from landing_cli.tour.lambert import lambert_arcs, solve_lambert
-from landing_cli.tour.lambert_time import least_time, solve_x, time_of_flight
+from landing_cli.tour.lambert_time import (
+    least_time as least_time_part,
+    solve_x as solve_x_part,
+    time_of_flight,
+)
+
+least_time = from_python(least_time_part)
+solve_x = from_python(solve_x_part)
 
 MU = GM_SUN_M3_S2
 ARCS = 10_000

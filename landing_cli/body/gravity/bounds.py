@@ -19,7 +19,7 @@ from landing_cli.body.gravity.kernel_types import FloatArray, Vector
 from landing_cli.body.gravity.kernels import acceleration_and_gradient, curvature
 from landing_cli.body.gravity.polyhedron_records import recorded_corners
 from landing_cli.errors import InputRefused
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 TOLERANCE = 0.005  # how far a bound may lie above the largest value met
 _SECOND_ORDER_MARGIN = 2.0  # covers the change of the second derivative within a patch
@@ -136,7 +136,7 @@ def _bound_on_surface(
     while True:
         directions, angles = _centres(triangles)
         sizes, ceilings, reaches = np.zeros((3, len(triangles)))
-        _fill_ceilings(int(field.kind), params, directions, semi_axes, angles, sizes, ceilings, reaches)
+        _fill_ceilings(field.kind, params, directions, semi_axes, angles, sizes, ceilings, reaches)
         points = directions * semi_axes
         attained = max(attained, sizes[region.holds(points, 0.0)].max(initial=0.0))
         open_patches = (ceilings > (1.0 + TOLERANCE) * attained) & region.holds(points, reaches)
@@ -192,7 +192,7 @@ def _unit(vectors: FloatArray) -> FloatArray:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
-@kernel
+@part
 def _stretch2(u: Vector, semi_axes: FloatArray) -> float:
     """Return the largest |D t|^2 over unit tangents t at u, D = diag(semi_axes).
 
@@ -207,7 +207,7 @@ def _stretch2(u: Vector, semi_axes: FloatArray) -> float:
 
 @kernel
 def _fill_ceilings(
-    kind: int,
+    kind: GravityKind,
     params: FloatArray,
     directions: FloatArray,
     semi_axes: FloatArray,

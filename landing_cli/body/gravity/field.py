@@ -1,6 +1,6 @@
 """One record for every gravity model: a kind and a flat parameter array.
 
-The compiled kernels take ``(kind, params)``, so that a solver compiles once for all models.
+The compiled kernels take ``(kind, params)``, so that a solver compiles once for all models (see `models`).
 """
 
 from __future__ import annotations

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from landing_cli.body.gravity.field import GravityField, GravityKind
-from landing_cli.body.gravity.interpolated_kernels import fitted_into
 from landing_cli.body.gravity.kernels import acceleration, acceleration_and_gradient, gradient, potential
 from landing_cli.kernel import kernel
 
@@ -29,13 +28,8 @@ def potentials(field: GravityField, points: ArrayLike) -> FloatArray:
         Positive: GM/r + ...
     """
     points = _rows(points)
-    if field.kind is GravityKind.INTERPOLATED:
-        held, fitted, rest = _pieces(field, points)
-        values = fitted[:, 0].copy()
-        values[~held] = potentials(rest, points[~held])
-        return values
     values = np.zeros(len(points))
-    _fill_potentials(int(field.kind), field.params.copy(), points, values)
+    _fill_potentials(field.kind, field.params.copy(), points, values)
     return values
 
 
@@ -54,13 +48,8 @@ def accelerations(field: GravityField, points: ArrayLike) -> FloatArray:
     (n, 3) float, m/s2, body frame
     """
     points = _rows(points)
-    if field.kind is GravityKind.INTERPOLATED:
-        held, fitted, rest = _pieces(field, points)
-        values = fitted[:, 1:4].copy()
-        values[~held] = accelerations(rest, points[~held])
-        return values
     values = np.zeros((len(points), 3))
-    _fill_accelerations(int(field.kind), field.params.copy(), points, values)
+    _fill_accelerations(field.kind, field.params.copy(), points, values)
     return values
 
 
@@ -80,13 +69,8 @@ def gradients(field: GravityField, points: ArrayLike) -> FloatArray:
         Symmetric; ``[k, i, j]`` is the derivative of component i along axis j.
     """
     points = _rows(points)
-    if field.kind is GravityKind.INTERPOLATED:
-        held, fitted, rest = _pieces(field, points)
-        values = _tensors(fitted)
-        values[~held] = gradients(rest, points[~held])
-        return values
     values = np.zeros((len(points), 3, 3))
-    _fill_gradients(int(field.kind), field.params.copy(), points, values)
+    _fill_gradients(field.kind, field.params.copy(), points, values)
     return values
 
 
@@ -107,13 +91,8 @@ def accelerations_and_gradients(field: GravityField, points: ArrayLike) -> tuple
         ``[k, i, j]`` is the derivative of component i along axis j.
     """
     points = _rows(points)
-    if field.kind is GravityKind.INTERPOLATED:
-        held, fitted, rest = _pieces(field, points)
-        g, G = fitted[:, 1:4].copy(), _tensors(fitted)
-        g[~held], G[~held] = accelerations_and_gradients(rest, points[~held])
-        return g, G
     g, G = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
-    _fill_both(int(field.kind), field.params.copy(), points, g, G)
+    _fill_both(field.kind, field.params.copy(), points, g, G)
     return g, G
 
 
@@ -121,33 +100,23 @@ def _rows(points: ArrayLike) -> FloatArray:
     return np.array(points, dtype=np.float64, order="C").reshape(-1, 3)
 
 
-def _pieces(field: GravityField, points: FloatArray) -> tuple[NDArray[np.bool_], FloatArray, GravityField]:
-    """Which points the pieces of an interpolated field hold, the values there, and the field elsewhere."""
-    held, fitted = np.zeros(len(points), dtype=np.bool_), np.zeros((len(points), 10))
-    fitted_into(field.params, points, held, fitted)
-    return held, fitted, GravityField(GravityKind.POLYHEDRON, field.params[int(field.params[0]) :])
-
-
-def _tensors(fitted: FloatArray) -> FloatArray:
-    """Gradients (n, 3, 3) from the last six of the fitted values: xx, yy, zz, xy, xz, yz."""
-    return fitted[:, [[4, 7, 8], [7, 5, 9], [8, 9, 6]]]
-
-
 @kernel
-def _fill_potentials(kind: int, params: FloatArray, points: FloatArray, values: FloatArray) -> None:
+def _fill_potentials(kind: GravityKind, params: FloatArray, points: FloatArray, values: FloatArray) -> None:
     for i in range(len(points)):
         values[i] = potential(kind, params, points[i, 0], points[i, 1], points[i, 2])
 
 
 @kernel
-def _fill_accelerations(kind: int, params: FloatArray, points: FloatArray, values: FloatArray) -> None:
+def _fill_accelerations(
+    kind: GravityKind, params: FloatArray, points: FloatArray, values: FloatArray
+) -> None:
     for i in range(len(points)):
         gx, gy, gz = acceleration(kind, params, points[i, 0], points[i, 1], points[i, 2])
         values[i, 0], values[i, 1], values[i, 2] = gx, gy, gz
 
 
 @kernel
-def _fill_gradients(kind: int, params: FloatArray, points: FloatArray, values: FloatArray) -> None:
+def _fill_gradients(kind: GravityKind, params: FloatArray, points: FloatArray, values: FloatArray) -> None:
     for i in range(len(points)):
         xx, yy, zz, xy, xz, yz = gradient(kind, params, points[i, 0], points[i, 1], points[i, 2])
         values[i, 0, 0], values[i, 1, 1], values[i, 2, 2] = xx, yy, zz
@@ -156,7 +125,9 @@ def _fill_gradients(kind: int, params: FloatArray, points: FloatArray, values: F
 
 
 @kernel
-def _fill_both(kind: int, params: FloatArray, points: FloatArray, g: FloatArray, G: FloatArray) -> None:
+def _fill_both(
+    kind: GravityKind, params: FloatArray, points: FloatArray, g: FloatArray, G: FloatArray
+) -> None:
     for i in range(len(points)):
         gx, gy, gz, xx, yy, zz, xy, xz, yz = acceleration_and_gradient(
             kind, params, points[i, 0], points[i, 1], points[i, 2]

@@ -22,7 +22,7 @@ from landing_cli.body.gravity.point_mass import (
     point_curvature,
     point_potential,
 )
-from landing_cli.kernel import kernel
+from landing_cli.kernel import kernel, part
 
 
 def harmonics_field(
@@ -63,7 +63,7 @@ def harmonics_field(
     return GravityField(GravityKind.HARMONICS, np.concatenate([[gm], gm * radius**2 * tensor]))
 
 
-@kernel
+@part
 def _times_q(params: Params, x: float, y: float, z: float) -> Vector:
     return (
         params[1] * x + params[4] * y + params[5] * z,

@@ -3,7 +3,7 @@
 The potential is a polynomial on every piece of the box that lies outside the body and could be fitted to
 within the tolerance (`fitted_pieces`); acceleration and gradient are its derivatives, so that the field stays
 conservative. Anywhere else, near edges of facets above all, the polyhedron itself is evaluated: the field is
-nowhere worse than what is measured. Kernels that are handed the field (`kernels`) evaluate the polyhedron.
+nowhere worse than what is measured.
 """
 
 from __future__ import annotations

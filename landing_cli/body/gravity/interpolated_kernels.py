@@ -1,4 +1,4 @@
-"""Evaluation of an interpolated field: down the tree of boxes, then Horner's scheme.
+"""Evaluation of an interpolated field: down the tree of boxes, then Horner's scheme; else the polyhedron.
 
 The parameters are where the polyhedron's own begin and where the coefficients begin, the box's origin, axes
 (rows), center and half, the tree, the coefficients piece by piece, and the polyhedron's parameters.
@@ -6,11 +6,14 @@ The parameters are where the polyhedron's own begin and where the coefficients b
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from landing_cli.body.gravity.kernel_types import FloatArray, Params
-from landing_cli.kernel import kernel
+from landing_cli.body.gravity.kernel_types import Params, Symmetric, Vector, VectorAndSymmetric
+from landing_cli.body.gravity.polyhedron import (
+    polyhedron_acceleration,
+    polyhedron_acceleration_and_gradient,
+    polyhedron_curvature,
+    polyhedron_potential,
+)
+from landing_cli.kernel import kernel, part
 
 DEGREE = 10
 PER_PIECE = (DEGREE + 1) * (DEGREE + 2) * (DEGREE + 3) // 6
@@ -21,8 +24,8 @@ _ROUNDING = 1e-9  # of the box: how far outside a point still counts as on its f
 Fitted = tuple[bool, float, float, float, float, float, float, float, float, float, float]
 
 
-@kernel
-def fitted_values(params: Params, x: float, y: float, z: float) -> Fitted:
+@part
+def _fitted_values(params: Params, x: float, y: float, z: float) -> Fitted:
     """Return whether a piece holds the point, then U, g and its gradient (xx, yy, zz, xy, xz, yz)."""
     nothing = (False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     dx, dy, dz = x - params[_ORIGIN], y - params[_ORIGIN + 1], z - params[_ORIGIN + 2]
@@ -110,11 +113,37 @@ def fitted_values(params: Params, x: float, y: float, z: float) -> Fitted:
 
 
 @kernel
-def fitted_into(params: Params, points: FloatArray, held: NDArray[np.bool_], values: FloatArray) -> None:
-    """Write which of (n, 3) points a piece holds (n,), and U, g and its gradient (n, 10) there."""
-    for i in range(len(points)):
-        fitted = fitted_values(params, points[i, 0], points[i, 1], points[i, 2])
-        held[i] = fitted[0]
-        values[i, 0], values[i, 1], values[i, 2], values[i, 3] = fitted[1], fitted[2], fitted[3], fitted[4]
-        values[i, 4], values[i, 5], values[i, 6] = fitted[5], fitted[6], fitted[7]
-        values[i, 7], values[i, 8], values[i, 9] = fitted[8], fitted[9], fitted[10]
+def interpolated_potential(params: Params, x: float, y: float, z: float) -> float:
+    """Return U."""
+    fitted = _fitted_values(params, x, y, z)
+    if fitted[0]:
+        return fitted[1]
+    return polyhedron_potential(params[int(params[0]) :], x, y, z)
+
+
+@kernel
+def interpolated_acceleration(params: Params, x: float, y: float, z: float) -> Vector:
+    """Return the gradient of U."""
+    fitted = _fitted_values(params, x, y, z)
+    if fitted[0]:
+        return fitted[2], fitted[3], fitted[4]
+    return polyhedron_acceleration(params[int(params[0]) :], x, y, z)
+
+
+@kernel
+def interpolated_acceleration_and_gradient(
+    params: Params, x: float, y: float, z: float
+) -> VectorAndSymmetric:
+    """Return the gradient and the Hessian (xx, yy, zz, xy, xz, yz) of U."""
+    fitted = _fitted_values(params, x, y, z)
+    if fitted[0]:
+        return fitted[2:]
+    return polyhedron_acceleration_and_gradient(params[int(params[0]) :], x, y, z)
+
+
+@kernel
+def interpolated_curvature(
+    params: Params, x: float, y: float, z: float, lx: float, ly: float, lz: float
+) -> Symmetric:
+    """Return the derivative of the polyhedron's Hessian along (lx, ly, lz): third derivatives are its own."""
+    return polyhedron_curvature(params[int(params[0]) :], x, y, z, lx, ly, lz)

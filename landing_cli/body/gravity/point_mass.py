@@ -8,8 +8,8 @@ import numpy as np
 
 from landing_cli.body.gravity.checks import checked_gm
 from landing_cli.body.gravity.field import GravityField, GravityKind
-from landing_cli.body.gravity.kernel_types import Symmetric, Vector, VectorAndSymmetric
-from landing_cli.kernel import kernel
+from landing_cli.body.gravity.kernel_types import Params, Symmetric, Vector, VectorAndSymmetric
+from landing_cli.kernel import kernel, part
 
 
 def point_mass_field(gm_m3_s2: float) -> GravityField:
@@ -33,13 +33,13 @@ def point_mass_field(gm_m3_s2: float) -> GravityField:
     return GravityField(GravityKind.POINT_MASS, np.array([checked_gm(gm_m3_s2)]))
 
 
-@kernel
+@part
 def point_potential(gm: float, x: float, y: float, z: float) -> float:
     """Return GM / r."""
     return gm / math.sqrt(x * x + y * y + z * z)
 
 
-@kernel
+@part
 def point_acceleration(gm: float, x: float, y: float, z: float) -> Vector:
     """Return the gradient of GM / r."""
     r2 = x * x + y * y + z * z
@@ -47,7 +47,7 @@ def point_acceleration(gm: float, x: float, y: float, z: float) -> Vector:
     return w * x, w * y, w * z
 
 
-@kernel
+@part
 def point_acceleration_and_gradient(gm: float, x: float, y: float, z: float) -> VectorAndSymmetric:
     """Return the gradient and the Hessian (xx, yy, zz, xy, xz, yz) of GM / r."""
     r2 = x * x + y * y + z * z
@@ -66,7 +66,7 @@ def point_acceleration_and_gradient(gm: float, x: float, y: float, z: float) -> 
     )
 
 
-@kernel
+@part
 def point_curvature(gm: float, x: float, y: float, z: float, lx: float, ly: float, lz: float) -> Symmetric:
     """Return the derivative of the Hessian of GM / r along (lx, ly, lz)."""
     r2 = x * x + y * y + z * z
@@ -82,3 +82,29 @@ def point_curvature(gm: float, x: float, y: float, z: float, lx: float, ly: floa
         s * (x * lz + lx * z) + c * x * z,
         s * (y * lz + ly * z) + c * y * z,
     )
+
+
+@kernel
+def point_mass_potential(params: Params, x: float, y: float, z: float) -> float:
+    """Return U."""
+    return point_potential(params[0], x, y, z)
+
+
+@kernel
+def point_mass_acceleration(params: Params, x: float, y: float, z: float) -> Vector:
+    """Return the gradient of U."""
+    return point_acceleration(params[0], x, y, z)
+
+
+@kernel
+def point_mass_acceleration_and_gradient(params: Params, x: float, y: float, z: float) -> VectorAndSymmetric:
+    """Return the gradient and the Hessian (xx, yy, zz, xy, xz, yz) of U."""
+    return point_acceleration_and_gradient(params[0], x, y, z)
+
+
+@kernel
+def point_mass_curvature(
+    params: Params, x: float, y: float, z: float, lx: float, ly: float, lz: float
+) -> Symmetric:
+    """Return the derivative of the Hessian of U along (lx, ly, lz)."""
+    return point_curvature(params[0], x, y, z, lx, ly, lz)

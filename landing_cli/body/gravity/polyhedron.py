@@ -23,7 +23,7 @@ from landing_cli.body.gravity.checks import checked_gm
 from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.kernel_types import Params, Symmetric, Vector, VectorAndSymmetric
 from landing_cli.body.gravity.polyhedron_records import facet_records
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, kernel, part
 
 _HEADER = 3
 _FACET = 13  # three corners, the unit normal, twice the area
@@ -59,7 +59,7 @@ def polyhedron_field(vertices: ArrayLike, faces: ArrayLike, gm_m3_s2: float) -> 
     return GravityField(GravityKind.POLYHEDRON, np.concatenate([header, two.ravel(), one.ravel()]))
 
 
-@kernel
+@part
 def _odd_series(t: float, u: float) -> float:
     """Return 2 (t + t u/3 + t u^2/5 + ...): 2 atanh t for u = t^2, 2 atan t for u = -t^2; |t| < 0.1."""
     u2 = u * u
@@ -68,7 +68,7 @@ def _odd_series(t: float, u: float) -> float:
     return 2.0 * t * (low + high * (u2 * u2))
 
 
-@kernel
+@part
 def _edge_log(length: float, r_sum: float) -> float:
     """Return ln((r1 + r2 + e)/(r1 + r2 - e)); on the edge itself it stays finite.
 
@@ -81,7 +81,7 @@ def _edge_log(length: float, r_sum: float) -> float:
     return math.log((1.0 + t) / (1.0 - t))
 
 
-@kernel
+@part
 def _solid_angle(triple: float, dots: float) -> float:
     """Return 2 atan2(a.(b x c), abc + a b.c + b a.c + c a.b) (Van Oosterom & Strackee 1983)."""
     if abs(triple) < 0.1 * dots:
@@ -90,7 +90,7 @@ def _solid_angle(triple: float, dots: float) -> float:
     return 2.0 * math.atan2(triple, dots)
 
 
-@kernel
+@part
 def _from_point(params: Params, k: int, x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """Return corner ``params[k:k + 3]`` relative to the point, and its distance."""
     rx, ry, rz = params[k] - x, params[k + 1] - y, params[k + 2] - z
@@ -114,7 +114,7 @@ def _facet(
     return ax, ay, az, a, bx, by, bz, b, c, height, angle
 
 
-@kernel
+@part
 def _edge_pull(params: Params, k: int, r_sum: float, rx: float, ry: float, rz: float) -> Vector:
     """Return E.r L of the edge at ``k``."""
     log = _edge_log(params[k], r_sum)
@@ -167,7 +167,7 @@ def polyhedron_acceleration(params: Params, x: float, y: float, z: float) -> Vec
     return params[2] * gx, params[2] * gy, params[2] * gz
 
 
-@kernel
+@part
 def _edge_tensor(params: Params, k: int, factor: float) -> Symmetric:
     """Return E of the edge at ``k``, times ``factor``."""
     return (
@@ -217,7 +217,7 @@ def polyhedron_acceleration_and_gradient(params: Params, x: float, y: float, z: 
     return m * gx, m * gy, m * gz, m * hxx, m * hyy, m * hzz, m * hxy, m * hxz, m * hyz
 
 
-@kernel
+@part
 def _edge_log_slope(length: float, r_sum: float, r_sum_slope: float) -> float:
     """Return the derivative of the edge's logarithm, given that of r1 + r2."""
     return -2.0 * length * r_sum_slope / ((r_sum - length) * (r_sum + length))
@@ -277,13 +277,13 @@ def polyhedron_curvature(
     return m * txx, m * tyy, m * tzz, m * txy, m * txz, m * tyz
 
 
-@kernel
+@part
 def laplacian(params: Params, x: float, y: float, z: float) -> float:
     """Return the Laplacian of U, 1/s2: 0 outside the body and -4 pi G rho inside."""
     return -4.0 * math.pi * params[2] * inside_share(params, x, y, z)
 
 
-@kernel
+@part
 def inside_share(params: Params, x: float, y: float, z: float) -> float:
     """Return the solid angle that the surface fills, over 4 pi: 0 outside, 1 inside, between on a facet."""
     twos, facets = int(params[0]), int(params[0]) + int(params[1])

@@ -19,8 +19,7 @@ from landing_cli.reach.free_descent import survey
 from landing_cli.reach.records import FacetSolutions, Verdict
 from landing_cli.reach.stored import CaseResult
 from landing_cli.reach.summary import summarise as summarise_facets
-from landing_cli.reach.verify import CaseReport
-from landing_cli.reach.verify import verify_run as fly_again
+from landing_cli.reach.verify import CaseReport, verify_run as fly_again
 from landing_cli.results.verification import Check, Report
 from landing_cli.studies.isochrone.intervals import facet_numbers, interval_at
 from landing_cli.studies.isochrone.records import End, Rows, StateResult

@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.reach.facet_work import solve_items as solve_facets
-from landing_cli.reach.facet_work import solve_without_proofs
+from landing_cli.reach.facet_work import solve_items as solve_facets, solve_without_proofs
 from landing_cli.reach.free_descent import Surroundings, prepare
 from landing_cli.reach.records import FacetSolutions, LandingCase
 from landing_cli.studies.isochrone.halving import Brackets, halves, middles, wide

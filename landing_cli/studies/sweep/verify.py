@@ -20,8 +20,7 @@ from landing_cli.reach.facet_work import in_chunks, solve_items
 from landing_cli.reach.records import FacetSolutions, join
 from landing_cli.reach.stored import CaseResult
 from landing_cli.reach.summary import summarise
-from landing_cli.reach.verify import CaseReport, Worst
-from landing_cli.reach.verify import verify_run as verify_reach
+from landing_cli.reach.verify import CaseReport, Worst, verify_run as verify_reach
 from landing_cli.studies.sweep.pipeline import prepare_cases
 from landing_cli.studies.sweep.records import CellResult, kept_columns
 
