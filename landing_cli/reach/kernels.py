@@ -88,7 +88,7 @@ def compile_parts(case: LandingCase) -> None:
         lambda _: survey(case),
     ]
     if case.descent == "extremal":
-        parts.insert(2, _extremals)
+        parts.insert(0, _extremals)
     if case.terrain == "require":
         parts.append(_terrain)
     with np.errstate(all="ignore"):
