@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from landing_cli.reach.keep_out_bound import (
     INTERVALS,
+    LEVEL,
     NODES,
     Descent,
     Facets,
-    LEVEL,
     Least,
     Weights,
     applied,
@@ -31,10 +31,10 @@ Flags = NDArray[np.bool_]
 # A value above this is positive whatever the rounding; D = 1.
 POSITIVE = 1e-6
 # Weight of the logarithms: at first, its fall at a good step, and the last.
-FIRST_BARRIER, FALL, LAST_BARRIER = 0.1, 0.4, 3e-4
-# The largest value lies above a centred one by the barrier times its order; a climb to less ends early.
-_GAP, HOPELESS = INTERVALS + NODES + 2 + 4 + 3 * NODES + 3, -0.1
-FIRST_ARCS, FIRST_SLOPE, FIRST_ELLIPSOID = 0.3, 0.03, 0.5
+FIRST_BARRIER, FALL, LAST_BARRIER = 0.05, 0.4, 3e-5
+# At a centred point the largest value lies above by less than this times the barrier; elsewhere it may not.
+GAP = 250.0
+FIRST_ARCS, FIRST_SLOPE, FIRST_ELLIPSOID = 0.5, 0.03, 0.5
 MOST_STEPS, MOST_HALVINGS, GOOD_STEP, KEPT = 24, 8, 0.4, 0.1
 _FLIP = np.array([1.0, -1.0, -1.0])
 _SCALARS = INTERVALS + NODES + 2
@@ -53,7 +53,7 @@ class Climb(NamedTuple):
 
 
 def first_weights(descent: Descent, facets: Facets) -> Weights:
-    """Weights to begin with: those of a flight from rest to rest, and of the ellipsoid what leaves H definite.
+    """Weights to begin with: those of a flight from rest to rest, and a little of the ellipsoid's.
 
     A unit of mu_i takes as much of the form, against the rest, as the largest eigenvalue of the i-th block of
     the inverse form in xi.
@@ -98,11 +98,12 @@ def climb(descent: Descent, facets: Facets, weights: Weights) -> Climb:
             whole[rows] = part
         best.value[rows] = least.value
         going = (least.value <= POSITIVE) & np.isfinite(least.value) & (barrier >= LAST_BARRIER)
-        going &= least.value + _GAP * barrier > HOPELESS
+        going &= least.value + GAP * barrier > 0.0
         if not going.any():
             break
         rows, barrier = rows[going], barrier[going]
-        facets, weights, least = (type(x)(*(a[going] for a in x)) for x in (facets, weights, least))
+        facets = Facets(*(x[going] for x in facets))
+        weights, least = Weights(*(x[going] for x in weights)), Least(*(x[going] for x in least))
         direction = _direction(descent, facets, weights, least, barrier)
         weights, least, length = _step(descent, facets, weights, least, barrier, direction)
         best.steps[rows] += 1
@@ -129,9 +130,7 @@ def _logarithms(weights: Weights) -> Floats:
     return np.nan_to_num(np.concatenate(parts, axis=1), nan=-np.inf, neginf=-np.inf).sum(axis=1)
 
 
-def _direction(
-    descent: Descent, facets: Facets, weights: Weights, least: Least, barrier: Floats
-) -> Floats:
+def _direction(descent: Descent, facets: Facets, weights: Weights, least: Least, barrier: Floats) -> Floats:
     """Newton's step, (n, m): relative for the scalar weights, absolute for the slopes', D held."""
     gradient, hessian, price = _derivatives(descent, facets, weights, least, barrier)
     gradient[:, :_SCALARS] += barrier[:, None]
@@ -155,8 +154,9 @@ def _derivatives(
 ) -> tuple[Floats, Floats, Floats]:
     """Gradient (n, m) and Hessian (n, m, m) of the least value and barrier log det H; gradient (n, m) of D.
 
-    The form is H = sum V_i V_i' over thrust and arc, less that over the ellipsoid; b_i is half the gradient of
-    the i-th constraint in the outputs. The least value's second derivatives are those of L less 2 b_i'H^-1 b_j.
+    The form is H = sum V_i V_i' over thrust and arc, less that over the ellipsoid; b_i is half the gradient
+    of the i-th constraint in the outputs. The second derivatives of the least value are those of L less
+    2 b_i'H^-1 b_j.
     """
     w, mu, omega, _ = weights
     n, last = len(w), 3 * (NODES - 1)

@@ -1,28 +1,30 @@
 """A bound on the thrust level of all flights that stay outside the keep-out ellipsoid, on whichever side.
 
-The sphere |xi| >= 1 is not convex, but its Lagrangian is a quadratic form, and so is everything else here but
-the glide slope, which is linear. Every flight with tau <= 1 has
+The outside |xi| >= 1 is not convex, but its Lagrangian is a quadratic form, and so is everything else here
+but the glide slope, which is linear. Every flight with tau <= 1 has
 
-- |a(t) - c(t)| <= A_k in interval k of the descent, with A_k = 1/m + sup |g - c|: a is its acceleration, m the
-  least mass that it can have, c any acceleration that is chosen beforehand (gravity's, about);
+- |a(t) - c(t)| <= A_k in interval k of the descent, with A_k = 1/m + sup |g - c|: a is its acceleration, m
+  the least mass that it can have, c any acceleration that is chosen beforehand (none, or about gravity's);
 - |xi(t_i)| >= level at the nodes t_i, the last one being the handover;
-- |B_j s + b_j| <= 1/m_j + sup |g - ...| at both ends of the final arc, whose thrust per mass is affine in the
-  handover state s = (r, v);
-- C_c s + d_c in the second-order cone Q for the glide slope at the handover and at touchdown.
+- |B_j s + b_j| <= C_j at both ends of the final arc, whose thrust per mass is affine in the handover state
+  s = (r, v) but for gravity: C_j = 1/m_j + sup of what gravity differs by from what b_j takes it to be;
+- S_c s + d_c in the second-order cone Q for the glide slope, at the handover and at touchdown.
 
 For weights w_k, mu_i, omega_j >= 0 and z_c in Q, no such flight therefore makes
 
-    L = sum w_k int |a - c|^2 - sum mu_i (|xi_i|^2 - level^2) + sum omega_j |B_j s + b_j|^2 - sum z_c'(C_c s + d_c)
-        - D,    D = sum w_k h A_k^2 + sum omega_j (1/m_j + ...)^2,
+    L = sum w_k int |a - c|^2 - sum mu_i (|xi_i|^2 - level^2) + sum omega_j |B_j s + b_j|^2
+        - sum z_c'(S_c s + d_c) - D,        D = sum w_k h A_k^2 + sum omega_j C_j^2,
 
-positive: if the least value of L over all paths is, no flight exists. With G the Gramian of the outputs
-o = (r(t_1), ..., r(t_K), v(1)) under the weight 1/w, int w |a - c|^2 is at least e'(G^-1 x I)e, e = o - (o of
-a = c), and attains it: the least value over paths is that over o, exact in continuous time, and closed.
-It is finite where the form H of L is positive definite. At weights of a stationary flight L touches tau^2 - 1:
-there is no gap, unless flights of nearly equal tau on several sides make H lose rank before.
+positive: where the least value of L over all paths is, no flight exists. With G the Gramian of the outputs
+o = (r(t_1), ..., r(t_K), v(1)) under the weight 1/w, int w |a - c|^2 is at least e'(G^-1 x I)e, where e is o
+less the outputs of a = c, and some control attains it: the least value over paths is that over o, exact in
+continuous time. It is finite where the form H of L in o is positive definite. With the multipliers of a
+flight of least thrust L falls no lower than tau^2 - 1 says, so there is no gap, unless flights of about the
+same tau on several sides make H lose rank before.
 
-L is homogeneous in the weights; with D = 1, sqrt(1 + L) is a bound on tau as that of `certificate` is: above
-1 it contradicts tau <= 1 and tells no more.
+A flight with less thrust, tau = T, keeps all this with T/m in place of 1/m, which lowers D to D(T). So the T
+with L + D - D(T) = 0 is a bound on tau like that of `certificate`: up to 1 it is one, and above 1 it
+contradicts tau <= 1 and tells no more.
 """
 
 from __future__ import annotations
@@ -74,8 +76,8 @@ class Facets(NamedTuple):
     centre: Floats  # (n, K + 1, 3) outputs of a = c
     accelerations: Floats  # (n, N) bounds A_k
     arc_offsets: Floats  # (n, 2, 3) b_j
-    arc_limits: Floats  # (n, 2) bounds of |B_j s + b_j|
-    slopes: Floats  # (n, 2, 3, 6) C_c
+    arc_limits: Floats  # (n, 2) C_j
+    slopes: Floats  # (n, 2, 3, 6) S_c
     slope_offsets: Floats  # (n, 2, 3) d_c
 
 
@@ -245,6 +247,35 @@ def least_value(descent: Descent, facets: Facets, weights: Weights) -> Least:
 def applied(matrices: Floats, vectors: Floats) -> Floats:
     """Multiply matrices (..., a, b) and vectors (..., b)."""
     return np.asarray((matrices @ vectors[..., None])[..., 0])
+
+
+def thrust_level(descent: Descent, facets: Facets, weights: Weights, value: Floats) -> Floats:
+    """Bound tau by the least value of L for some weights.
+
+    Parameters
+    ----------
+    descent : Descent
+        The case.
+    facets : Facets
+        What flights keep.
+    weights : Weights
+        Of the value.
+    value : (n,) float
+        From :func:`least_value`.
+
+    Returns
+    -------
+    (n,) float
+        The level T at which L + D - D(T) vanishes; 0 where there is none.
+    """
+    masses = np.concatenate([descent.least_mass, descent.ends_mass])
+    w = np.concatenate([weights.thrust / INTERVALS, weights.arc], axis=1)
+    limits = np.concatenate([facets.accelerations, facets.arc_limits], axis=1)
+    gravity = limits - 1.0 / masses
+    square, twice = (w / masses**2).sum(axis=1), (w * gravity / masses).sum(axis=1)
+    rest = (w * gravity**2).sum(axis=1) - (w * limits**2).sum(axis=1) - value
+    root = np.sqrt(np.maximum(twice**2 - square * rest, 0.0))
+    return np.maximum((root - twice) / square, 0.0)
 
 
 def _log_determinants(forms: Floats) -> Floats:

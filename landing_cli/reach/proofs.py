@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.reach.keep_out_ascent import climb, first_weights
-from landing_cli.reach.keep_out_bound import descent_of, facets_of
+from landing_cli.reach.keep_out_ascent import POSITIVE, climb, first_weights
+from landing_cli.reach.keep_out_bound import descent_of, facets_of, thrust_level
 from landing_cli.reach.records import Binding, FacetSolutions, Verdict
 from landing_cli.reach.sides import bounds_around
 
@@ -80,5 +80,5 @@ def bounds_outside(prepared: PreparedCase, facets: Ints) -> tuple[Floats, Ints]:
         return np.full(len(facets), np.nan), np.zeros(len(facets), dtype=np.int64)
     kept = facets_of(descent, shared.centroids_m[facets] / descent.case.length_m, shared.normals[facets])
     climbed = climb(descent, kept, first_weights(descent, kept))
-    bounds = np.sqrt(1.0 + np.maximum(climbed.value, 0.0))
-    return np.where(climbed.value > 0.0, bounds, np.nan), climbed.steps
+    bounds = thrust_level(descent, kept, climbed.weights, climbed.value)
+    return np.where(climbed.value > POSITIVE, bounds, np.nan), climbed.steps
