@@ -32,8 +32,9 @@ Flags = NDArray[np.bool_]
 POSITIVE = 1e-6
 # Weight of the logarithms: at first, its fall at a good step, and the last.
 FIRST_BARRIER, FALL, LAST_BARRIER = 0.05, 0.4, 3e-5
-# At a centred point the largest value lies above by less than this times the barrier; elsewhere it may not.
-GAP = 250.0
+# At a centred point the largest value lies above by less than GAP times the barrier; elsewhere it may not.
+# What cannot get above HOPELESS is given up.
+GAP, HOPELESS = 250.0, -0.15
 FIRST_ARCS, FIRST_SLOPE, FIRST_ELLIPSOID = 0.5, 0.03, 0.5
 MOST_STEPS, MOST_HALVINGS, GOOD_STEP, KEPT = 24, 8, 0.4, 0.1
 _FLIP = np.array([1.0, -1.0, -1.0])
@@ -72,7 +73,9 @@ def first_weights(descent: Descent, facets: Facets) -> Weights:
     return free._replace(ellipsoid=FIRST_ELLIPSOID / NODES / np.linalg.norm(spread, ord=2, axis=(2, 3)))
 
 
-def climb(descent: Descent, facets: Facets, weights: Weights) -> Climb:
+def climb(
+    descent: Descent, facets: Facets, weights: Weights, first_barrier: float = FIRST_BARRIER
+) -> Climb:
     """Raise the least value of L from given weights until it is positive or as large as it gets.
 
     Parameters
@@ -83,6 +86,8 @@ def climb(descent: Descent, facets: Facets, weights: Weights) -> Climb:
         What flights to n facets keep.
     weights : Weights
         To begin with.
+    first_barrier : float
+        Weight of the logarithms at first; small where the weights are those of much the same problem.
 
     Returns
     -------
@@ -91,14 +96,14 @@ def climb(descent: Descent, facets: Facets, weights: Weights) -> Climb:
     n = len(facets.accelerations)
     weights = _normalised(facets, weights)
     best = Climb(Weights(*(x.copy() for x in weights)), np.full(n, -np.inf), np.zeros(n, dtype=np.int64))
-    barrier = np.full(n, FIRST_BARRIER)
+    barrier = np.full(n, first_barrier)
     rows, least = np.arange(n), least_value(descent, facets, weights)
     for _ in range(MOST_STEPS):
         for whole, part in zip(best.weights, weights, strict=True):
             whole[rows] = part
         best.value[rows] = least.value
         going = (least.value <= POSITIVE) & np.isfinite(least.value) & (barrier >= LAST_BARRIER)
-        going &= least.value + GAP * barrier > 0.0
+        going &= least.value + GAP * barrier > HOPELESS
         if not going.any():
             break
         rows, barrier = rows[going], barrier[going]

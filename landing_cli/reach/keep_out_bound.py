@@ -73,8 +73,10 @@ class Descent(NamedTuple):
 class Facets(NamedTuple):
     """What is supposed of the flights to each of n facets."""
 
+    reference: Floats  # (n, N, 3) c_k
     centre: Floats  # (n, K + 1, 3) outputs of a = c
     accelerations: Floats  # (n, N) bounds A_k
+    handover_gravity: Floats  # (n, 3) what b_j at the handover takes gravity to be
     arc_offsets: Floats  # (n, 2, 3) b_j
     arc_limits: Floats  # (n, 2) C_j
     slopes: Floats  # (n, 2, 3, 6) S_c
@@ -174,8 +176,10 @@ def facets_of(descent: Descent, targets: Floats, normals: Floats) -> Facets:
         limits[:, 1] += descent.gravity[-1]
     offsets -= applied(descent.arc_maps, still[:, None])
     return Facets(
+        np.zeros((n, INTERVALS, 3)),
         np.tile(descent.drift, (n, 1, 1)),
         np.tile(1.0 / descent.least_mass + descent.gravity, (n, 1)),
+        np.zeros((n, 3)),
         offsets,
         limits,
         slopes,

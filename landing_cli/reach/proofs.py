@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.reach.keep_out_ascent import POSITIVE, climb, first_weights
-from landing_cli.reach.keep_out_bound import descent_of, facets_of, thrust_level
+from landing_cli.reach.keep_out_bound import (
+    Facets,
+    Weights,
+    descent_of,
+    facets_of,
+    least_value,
+    thrust_level,
+)
+from landing_cli.reach.keep_out_gravity import with_known_gravity
 from landing_cli.reach.records import Binding, FacetSolutions, Verdict
 from landing_cli.reach.sides import bounds_around
 
@@ -21,6 +29,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+# Where a climb ends between this and a proof, gravity is looked at where flights can be, so many times.
+NEAR, ROUNDS, NEXT_BARRIER = -0.2, 2, 3e-3
 
 
 def with_proofs(prepared: PreparedCase, solutions: FacetSolutions) -> FacetSolutions:
@@ -81,4 +92,18 @@ def bounds_outside(prepared: PreparedCase, facets: Ints) -> tuple[Floats, Ints]:
     kept = facets_of(descent, shared.centroids_m[facets] / descent.case.length_m, shared.normals[facets])
     climbed = climb(descent, kept, first_weights(descent, kept))
     bounds = thrust_level(descent, kept, climbed.weights, climbed.value)
-    return np.where(climbed.value > POSITIVE, bounds, np.nan), climbed.steps
+    value, steps = climbed.value, climbed.steps
+    weights, places = climbed.weights, np.arange(len(facets))
+    for _ in range(ROUNDS):
+        near = (value[places] <= POSITIVE) & (value[places] > NEAR)
+        if not near.any():
+            break
+        places = places[near]
+        kept, weights = Facets(*(x[near] for x in kept)), Weights(*(x[near] for x in weights))
+        least = least_value(descent, kept, weights)
+        kept = with_known_gravity(descent, shared.surface, kept, least)
+        climbed = climb(descent, kept, weights, NEXT_BARRIER)
+        weights = climbed.weights
+        value[places], bounds[places] = climbed.value, thrust_level(descent, kept, weights, climbed.value)
+        steps[places] += climbed.steps
+    return np.where(value > POSITIVE, bounds, np.nan), steps

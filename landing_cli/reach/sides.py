@@ -46,7 +46,7 @@ MOST_FAMILIES, MOST_PLANES, LIMIT = 40, 6, 30
 NEVER, MARGIN_WEIGHT = 1 << 30, 1e-3
 
 _SIGNS = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)], dtype=np.float64)
-_OCTAHEDRON = _SIGNS[:, :, None] * np.eye(3)  # (8, 3, 3) corners of its triangles
+OCTAHEDRON = _SIGNS[:, :, None] * np.eye(3)  # (8, 3, 3) corners of its triangles
 
 
 class Branch(NamedTuple):
@@ -148,12 +148,12 @@ def _children(opened: Open) -> list[Branch]:
     """Cover the flights of a branch: by eight triangles at a new node, or by four in place of an old one."""
     place, nodes, triangles = opened.branch
     if opened.node not in nodes:
-        cover = _OCTAHEDRON @ _frame_about(opened.direction)
+        cover = OCTAHEDRON @ _frame_about(opened.direction)
         return [Branch(place, (*nodes, opened.node), (*triangles, triangle)) for triangle in cover]
     at = nodes.index(opened.node)
     return [
         Branch(place, nodes, (*triangles[:at], part, *triangles[at + 1 :]))
-        for part in _quarters(triangles[at])
+        for part in quarters(triangles[at])
     ]
 
 
@@ -165,7 +165,7 @@ def _frame_about(direction: Floats) -> Floats:
     return np.stack([across, np.cross(direction, across), direction])
 
 
-def _quarters(triangle: Floats) -> list[Floats]:
+def quarters(triangle: Floats) -> list[Floats]:
     """Cut a spherical triangle in four at the middles of its sides."""
     a, b, c = triangle
     middles = np.stack([a + b, b + c, c + a])
