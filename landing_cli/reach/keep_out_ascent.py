@@ -35,7 +35,7 @@ FIRST_BARRIER, FALL, LAST_BARRIER = 0.05, 0.4, 3e-5
 # At a centred point the largest value lies above by less than GAP times the barrier; elsewhere it may not.
 # What cannot get above HOPELESS is given up.
 GAP, HOPELESS = 250.0, -0.15
-FIRST_ARCS, FIRST_SLOPE, FIRST_ELLIPSOID = 0.5, 0.03, 0.5
+FIRST_ARCS, FIRST_SLOPE, FIRST_ELLIPSOID = 0.9, 0.03, 0.5
 MOST_STEPS, MOST_HALVINGS, GOOD_STEP, KEPT = 24, 8, 0.4, 0.1
 _FLIP = np.array([1.0, -1.0, -1.0])
 _SCALARS = INTERVALS + NODES + 2
@@ -73,9 +73,7 @@ def first_weights(descent: Descent, facets: Facets) -> Weights:
     return free._replace(ellipsoid=FIRST_ELLIPSOID / NODES / np.linalg.norm(spread, ord=2, axis=(2, 3)))
 
 
-def climb(
-    descent: Descent, facets: Facets, weights: Weights, first_barrier: float = FIRST_BARRIER
-) -> Climb:
+def climb(descent: Descent, facets: Facets, weights: Weights, first_barrier: float = FIRST_BARRIER) -> Climb:
     """Raise the least value of L from given weights until it is positive or as large as it gets.
 
     Parameters

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import signed_distances
-from landing_cli.body.gravity.field import GravityField
+from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.field_values import accelerations, accelerations_and_gradients
 from landing_cli.reach.keep_out_bound import INTERVALS, NODES, PER_NODE, Descent, Facets, Least, applied
 from landing_cli.reach.sides import OCTAHEDRON, quarters
@@ -75,9 +75,7 @@ def with_known_gravity(descent: Descent, surface: SurfaceIndex, facets: Facets, 
     return _with_known_handover(descent, surface, facets, handover) if descent.case.compensated else facets
 
 
-def _with_known_handover(
-    descent: Descent, surface: SurfaceIndex, facets: Facets, handover: Balls
-) -> Facets:
+def _with_known_handover(descent: Descent, surface: SurfaceIndex, facets: Facets, handover: Balls) -> Facets:
     """Suppose of the thrust at the handover what gravity can be there."""
     known, spread = _gravity_in(descent, surface, handover)
     bound = 1.0 / descent.ends_mass[1] + spread
@@ -131,12 +129,21 @@ def _gravity_in(descent: Descent, surface: SurfaceIndex, balls: Balls) -> tuple[
     centre_m = applied(turns, balls.centre.reshape(-1, 3)) * case.length_m
     radius_m = balls.radius.ravel() * case.length_m
     clear = signed_distances(surface, centre_m) > radius_m
+    for mass_m in _point_masses(field):
+        clear &= np.linalg.norm(centre_m - mass_m, axis=1) > radius_m
     gravity, spread = np.zeros_like(centre_m), np.full(len(radius_m), np.inf)
     if clear.any():
         gravity[clear] = accelerations(field, centre_m[clear])
         spread[clear] = _largest_change(field, centre_m[clear], radius_m[clear], gravity[clear])
     gravity = applied(turns.transpose(0, 2, 1), gravity) / case.acceleration_m_s2
     return gravity.reshape(balls.centre.shape), (spread / case.acceleration_m_s2).reshape(balls.radius.shape)
+
+
+def _point_masses(field: GravityField) -> Floats:
+    """Where a field is singular, (k, 3), m: a polyhedron, which is the body, only on the body's surface."""
+    if field.kind == GravityKind.DIPOLE:
+        return np.array([[*field.params[1:3], 0.0], [*field.params[4:6], 0.0]])
+    return np.zeros((1, 3))
 
 
 def _largest_change(field: GravityField, centre_m: Floats, radius_m: Floats, gravity: Floats) -> Floats:

@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 # Where a climb ends between this and a proof, gravity is looked at where flights can be, so many times.
-NEAR, ROUNDS, NEXT_BARRIER = -0.2, 2, 3e-3
+NEAR, ROUNDS, NEXT_BARRIER = -0.2, 2, 1e-3
 
 
 def with_proofs(prepared: PreparedCase, solutions: FacetSolutions) -> FacetSolutions:
