@@ -6,10 +6,11 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from landing_samples import asteroid, landing_case
+from landing_samples import SPIN_RAD_S, asteroid, landing_case, rock
 from truth.tables import landing_case as true_case
 from truth.tables import read_table
 
+from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.dipole import dipole_field
 from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.field_values import accelerations
@@ -31,6 +32,7 @@ from landing_cli.reach.keep_out_bound import (
 from landing_cli.reach.keep_out_gravity import BALLS, with_known_gravity
 from landing_cli.reach.margin import least_thrust_flights
 from landing_cli.reach.records import Verdict
+from landing_cli.reach.scaled_case import gravity_in_space
 from landing_cli.reach.shooting import fly_accurately
 
 ROCKS = {"rock": {"tof_s": 720.0}, "short stage": {"tof_s": 700.0, "final_stage_s": 90.0}}
@@ -190,6 +192,80 @@ def test_thrust_at_the_handover_counts_the_gravity_that_is_known() -> None:
     )
     np.testing.assert_array_equal(kept.arc_offsets[:, 0], start.arc_offsets[:, 0])
     np.testing.assert_array_equal(kept.arc_limits[:, 0], start.arc_limits[:, 0])
+
+
+def test_a_body_that_turns_fast_pulls_no_more_than_is_known() -> None:
+    """Two masses that turn by a fifth of a radian to either end of a while; the path is as good as known."""
+    spin = 60.0 * SPIN_RAD_S
+    body = Asteroid("two masses", rock(), spin, dipole_field(49.0, 0.5, 440.0), 49.0)
+    case = landing_case(body, position_m=np.array([300.0, 100.0, 650.0]), tof_s=720.0)
+    shared = survey(case)
+    descent = descent_of(case, shared.bounds)
+    facets = np.arange(0, 320, 40)
+    kept = facets_of(descent, shared.centroids_m[facets] / descent.case.length_m, shared.normals[facets])
+    least = least_value(descent, kept, first_weights(descent, kept))
+    least = least._replace(value=np.full(len(facets), -1e-12))
+    known = with_known_gravity(descent, shared.surface, kept, least)
+    tighter = known.accelerations < kept.accelerations
+    assert tighter.mean() > 0.2
+    t = np.arange(STEPS + 1) / STEPS
+    nodes = np.concatenate(
+        [np.tile(descent.case.position, (len(facets), 1, 1)), least.outputs[:, :-1]], axis=1
+    )
+    c, s = np.cos(descent.case.spin * (t - 1.0)), np.sin(descent.case.spin * (t - 1.0))
+    closest = 0.0
+    for f in range(len(facets)):
+        x, y, z = (np.interp(t, np.arange(NODES + 1) / NODES, nodes[f, :, i]) for i in range(3))
+        turned = np.stack([c * x + s * y, c * y - s * x, z], axis=1) * descent.case.length_m
+        g = accelerations(body.gravity, turned) / descent.case.acceleration_m_s2
+        g = np.stack([c * g[:, 0] - s * g[:, 1], s * g[:, 0] + c * g[:, 1], g[:, 2]], axis=1)
+        for k in np.flatnonzero(tighter[f]):
+            here = g[k * STEPS // INTERVALS : (k + 1) * STEPS // INTERVALS + 1] - known.reference[f, k]
+            share = np.linalg.norm(here, axis=1).max()
+            share /= known.accelerations[f, k] - 1.0 / descent.least_mass[k]
+            assert share <= 1.0
+            closest = max(closest, share)
+    assert closest > 0.05
+
+
+def test_gravity_is_taken_where_the_body_is_turned_to() -> None:
+    p, _, _ = flown("rock")
+    descent, _, _ = climbed("rock")
+    case, rng = descent.case, np.random.default_rng(8)
+    points = rng.normal(size=(INTERVALS + 1, 3))
+    points *= 700.0 / case.length_m / np.linalg.norm(points, axis=1, keepdims=True)
+    time = np.arange(INTERVALS + 1) / INTERVALS
+    balls = keep_out_gravity.Balls(points, np.full(len(time), 1e-9), time, 0.0)
+    gravity, spread = keep_out_gravity._gravity_in(descent, p.shared.surface, balls)
+    for k, x in enumerate(points):
+        expected = gravity_in_space(case, case.node_cos[k], case.node_sin[k], *x)
+        np.testing.assert_allclose(gravity[k], expected, rtol=1e-10, atol=0)
+    assert spread.max() < 1e-6 * np.linalg.norm(gravity, axis=1).min()
+
+
+def test_paths_that_bend_as_much_as_they_can_stay_in_the_balls() -> None:
+    """Between nodes that are known exactly, with all thrust and gravity across the chord."""
+    descent, _, least = climbed("rock")
+    still = descent._replace(case=descent.case._replace(spin=0.0))
+    along, _ = keep_out_gravity._balls(still, least._replace(value=np.full(len(least.value), -1e-300)))
+    strongest = (1.0 / descent.least_mass + descent.gravity).max()
+    nodes = np.concatenate(
+        [np.tile(descent.case.position, (len(least.value), 1, 1)), least.outputs[:, :NODES]], axis=1
+    )
+    chord = np.diff(nodes, axis=1)
+    across = np.cross(chord, [0.3, -0.5, 0.8])
+    across /= np.linalg.norm(across, axis=2, keepdims=True)
+    width = BALLS * INTERVALS // NODES
+    centre = along.centre.reshape(len(nodes), NODES, width, 3)
+    radius = along.radius.reshape(len(nodes), NODES, width)
+    tight = 0.0
+    for ball in range(width):
+        for share in np.linspace(ball / width, (ball + 1) / width, 7):
+            bend = 0.5 * strongest * share * (1.0 - share) / NODES**2
+            away = np.linalg.norm(nodes[:, :-1] + share * chord + bend * across - centre[:, :, ball], axis=2)
+            assert (away <= radius[:, :, ball] * (1 + 1e-12)).all()
+            tight = max(tight, float((away / radius[:, :, ball]).max()))
+    assert tight > 0.8
 
 
 FIELDS = {

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# No bound on so few nodes tells a thrust level from 1 that is nearer to it than this: none is tried.
+LEAST_EXCESS = 0.003
 # Where a climb ends between this and a proof, gravity is looked at where flights can be, so many times.
 NEAR, ROUNDS, NEXT_BARRIER = -0.2, 2, 1e-3
 
@@ -51,6 +53,7 @@ def with_proofs(prepared: PreparedCase, solutions: FacetSolutions) -> FacetSolut
     """
     rows = solutions.rows
     stopped = (rows["verdict"] == Verdict.UNREACHABLE) & (rows["proved"] == 0)
+    stopped &= rows["violation"] > LEAST_EXCESS
     # of flights through rock nothing is supposed in any bound
     places = np.flatnonzero(stopped & (rows["binding"] != Binding.TERRAIN))
     if len(places) == 0:
