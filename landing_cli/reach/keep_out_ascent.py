@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from landing_cli.reach.keep_out_bound import (
     INTERVALS,
-    LEVEL,
     NODES,
     Descent,
     Facets,
@@ -38,11 +37,6 @@ GAP, HOPELESS = 250.0, -0.15
 FIRST_ARCS, FIRST_SLOPE, FIRST_ELLIPSOID = 0.9, 0.03, 0.5
 MOST_STEPS, MOST_HALVINGS, GOOD_STEP, KEPT = 24, 8, 0.4, 0.1
 _FLIP = np.array([1.0, -1.0, -1.0])
-_SCALARS = INTERVALS + NODES + 2
-_OTHERS = NODES + 2
-# how a weight enters the form
-_SIGN = np.concatenate([np.ones(INTERVALS), -np.ones(NODES), np.ones(2)])
-_SIGNS = _SIGN[:, None] * _SIGN
 
 
 class Climb(NamedTuple):
@@ -66,9 +60,9 @@ def first_weights(descent: Descent, facets: Facets) -> Weights:
     slope[:, :, 0] = FIRST_SLOPE
     arc = 0.5 * FIRST_ARCS / facets.arc_limits**2
     thrust = (1.0 - FIRST_ARCS) * share / share.mean() / facets.accelerations**2
-    free = Weights(thrust, np.zeros((n, NODES)), arc, slope)
+    free = Weights(thrust, np.zeros((n, len(descent.places))), arc, slope)
     inverse = np.linalg.inv(least_value(descent, facets, free).form)
-    loose = [inverse[:, i : i + 3, i : i + 3] for i in range(0, 3 * NODES, 3)]
+    loose = [inverse[:, i : i + 3, i : i + 3] for i in 3 * descent.places]
     spread = descent.axes @ np.stack(loose, axis=1) @ descent.axes.transpose(0, 2, 1)
     return free._replace(ellipsoid=FIRST_ELLIPSOID / NODES / np.linalg.norm(spread, ord=2, axis=(2, 3)))
 
@@ -136,12 +130,12 @@ def _logarithms(weights: Weights) -> Floats:
 def _direction(descent: Descent, facets: Facets, weights: Weights, least: Least, barrier: Floats) -> Floats:
     """Newton's step, (n, m): relative for the scalar weights, absolute for the slopes', D held."""
     gradient, hessian, price = _derivatives(descent, facets, weights, least, barrier)
-    gradient[:, :_SCALARS] += barrier[:, None]
-    scalars = np.arange(_SCALARS)
-    hessian[:, scalars, scalars] -= barrier[:, None]
+    scalars = gradient.shape[1] - 6
+    gradient[:, :scalars] += barrier[:, None]
+    hessian[:, np.arange(scalars), np.arange(scalars)] -= barrier[:, None]
     values = _cone_values(weights.slope)
     for c in range(2):
-        at = slice(_SCALARS + 3 * c, _SCALARS + 3 * c + 3)
+        at = slice(scalars + 3 * c, scalars + 3 * c + 3)
         normal = 2.0 * _FLIP * weights.slope[:, c] / values[:, c, None]
         gradient[:, at] += barrier[:, None] * normal
         bend = 2.0 * np.diag(_FLIP) / values[:, c, None, None] - normal[:, :, None] * normal[:, None, :]
@@ -162,7 +156,9 @@ def _derivatives(
     2 b_i'H^-1 b_j.
     """
     w, mu, omega, _ = weights
-    n, last = len(w), 3 * (NODES - 1)
+    n, m, last = *mu.shape, 3 * (NODES - 1)
+    second, scalars = INTERVALS + m, INTERVALS + m + 2
+    sign = np.concatenate([np.ones(INTERVALS), -descent.outside, np.ones(2)])
     outputs = least.outputs
     ends = outputs.reshape(n, -1)[:, last:]
     # relative changes of w change G^-1 by D_k D_k'
@@ -170,7 +166,7 @@ def _derivatives(
     pulls = (least.inverse_gramian @ roots.reshape(n, NODES + 1, -1)).reshape(roots.shape)
     flat_pulls, flat_roots = pulls.reshape(n, NODES + 1, -1), roots.reshape(n, NODES + 1, -1)
     parts = (flat_pulls.transpose(0, 2, 1) @ (outputs - facets.centre)).reshape(n, INTERVALS, 2, 3)
-    xi = applied(descent.axes, outputs[:, :NODES])
+    xi = applied(descent.axes, outputs[:, descent.places])
     thrust = applied(descent.arc_maps, ends[:, None]) + facets.arc_offsets
     slopes = applied(facets.slopes, ends[:, None]) + facets.slope_offsets
     energies = (parts**2).sum(axis=(2, 3))
@@ -178,22 +174,22 @@ def _derivatives(
     gradient = np.concatenate(
         [
             energies - prices[0],
-            mu * (LEVEL**2 - (xi**2).sum(axis=2)),
+            descent.outside * mu * (descent.levels**2 - (xi**2).sum(axis=2)),
             omega * (thrust**2).sum(axis=2) - prices[1],
             -slopes.reshape(n, -1),
         ],
         axis=1,
     )
     price = np.zeros_like(gradient)
-    price[:, :INTERVALS], price[:, INTERVALS + NODES : _SCALARS] = prices
+    price[:, :INTERVALS], price[:, second:scalars] = prices
 
     # the other weights' columns V, ellipsoid and arc
-    columns = np.zeros((n, 3 * NODES + 3, 3 * _OTHERS))
-    for i in range(NODES):
-        at = slice(3 * i, 3 * i + 3)
-        columns[:, at, at] = np.sqrt(mu)[:, i, None, None] * descent.axes[i].T
+    columns = np.zeros((n, 3 * NODES + 3, 3 * m + 6))
+    for i, place in enumerate(descent.places):
+        at = slice(3 * place, 3 * place + 3)
+        columns[:, at, 3 * i : 3 * i + 3] = np.sqrt(mu)[:, i, None, None] * descent.axes[i].T
     arc = np.sqrt(omega)[:, None, :, None] * descent.arc_maps.transpose(2, 0, 1)
-    columns[:, last:, 3 * NODES :] = arc.reshape(n, 6, 6)
+    columns[:, last:, 3 * m :] = arc.reshape(n, 6, 6)
     inverse = np.linalg.inv(least.form)
     by_axes = inverse.reshape(n, NODES + 1, 3, NODES + 1, 3).transpose(0, 2, 4, 1, 3)
     turned_pulls = flat_pulls.transpose(0, 2, 1)
@@ -201,7 +197,7 @@ def _derivatives(
     solved = inverse @ columns
     mixed = turned_pulls @ solved.reshape(n, NODES + 1, -1)
     others = columns.transpose(0, 2, 1) @ solved
-    squares = np.empty((n, _SCALARS, _SCALARS))
+    squares = np.empty((n, scalars, scalars))
     squares[:, :INTERVALS, :INTERVALS] = _block_sums((own**2).sum(axis=(1, 2)), 2, 2)
     squares[:, INTERVALS:, INTERVALS:] = _block_sums(others**2, 3, 3)
     crossed = (mixed.reshape(n, 2 * INTERVALS, 3, -1) ** 2).sum(axis=2)
@@ -215,16 +211,17 @@ def _derivatives(
         ],
         axis=1,
     )
-    factors = np.concatenate([-np.sqrt(mu)[:, :, None] * xi, np.sqrt(omega)[:, :, None] * thrust], axis=1)
-    halves = np.zeros((n, 3 * NODES + 3, _SCALARS + 6))
+    held = -(descent.outside * np.sqrt(mu))[:, :, None] * xi
+    factors = np.concatenate([held, np.sqrt(omega)[:, :, None] * thrust], axis=1)
+    halves = np.zeros((n, 3 * NODES + 3, scalars + 6))
     pulled = (pulls[:, :, :, :, None] * parts[:, None]).sum(axis=3)
     halves[:, :, :INTERVALS] = pulled.transpose(0, 1, 3, 2).reshape(n, -1, INTERVALS)
     moved = columns * factors.reshape(n, 1, -1)
-    halves[:, :, INTERVALS:_SCALARS] = moved.reshape(n, -1, _OTHERS, 3).sum(axis=3)
-    halves[:, last:, _SCALARS:] = -0.5 * facets.slopes.reshape(n, 6, 6).transpose(0, 2, 1)
+    halves[:, :, INTERVALS:scalars] = moved.reshape(n, -1, m + 2, 3).sum(axis=3)
+    halves[:, last:, scalars:] = -0.5 * facets.slopes.reshape(n, 6, 6).transpose(0, 2, 1)
     hessian = -2.0 * halves.transpose(0, 2, 1) @ (inverse @ halves)
-    hessian[:, :_SCALARS, :_SCALARS] -= barrier[:, None, None] * _SIGNS * squares
-    gradient[:, :_SCALARS] += barrier[:, None] * _SIGN * traces
+    hessian[:, :scalars, :scalars] -= barrier[:, None, None] * sign[:, None] * sign * squares
+    gradient[:, :scalars] += barrier[:, None] * sign * traces
     # G^-1 is not linear in w
     cross = flat_roots.transpose(0, 2, 1) @ flat_pulls
     flat_parts = parts.reshape(n, -1, 3)
@@ -246,7 +243,7 @@ def _step(
 ) -> tuple[Weights, Least, Floats]:
     """Go along a direction as far as what is climbed rises; returns how far, 0 where it does not."""
     before = least.value + barrier * (least.volume + _logarithms(weights))
-    longest = np.maximum((-direction[:, :_SCALARS]).max(axis=1), 1e-300)
+    longest = np.maximum((-direction[:, :-6]).max(axis=1), 1e-300)
     length = np.minimum(1.0, (1.0 - KEPT) / longest)
     weights = Weights(*(x.copy() for x in weights))
     least = Least(*(x.copy() for x in least))
@@ -274,10 +271,10 @@ def _step(
 
 def _moved(weights: Weights, direction: Floats, length: Floats) -> Weights:
     step = length[:, None] * direction
-    first, second = INTERVALS, INTERVALS + NODES
+    first, second = INTERVALS, INTERVALS + weights.ellipsoid.shape[1]
     return Weights(
         weights.thrust * (1.0 + step[:, :first]),
         weights.ellipsoid * (1.0 + step[:, first:second]),
-        weights.arc * (1.0 + step[:, second:_SCALARS]),
-        weights.slope + step[:, _SCALARS:].reshape(-1, 2, 3),
+        weights.arc * (1.0 + step[:, second:-6]),
+        weights.slope + step[:, -6:].reshape(-1, 2, 3),
     )

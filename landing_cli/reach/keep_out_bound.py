@@ -5,7 +5,8 @@ but the glide slope, which is linear. Every flight with tau <= 1 has
 
 - |a(t) - c(t)| <= A_k in interval k of the descent, with A_k = 1/m + sup |g - c|: a is its acceleration, m
   the least mass that it can have, c any acceleration that is chosen beforehand (none, or about gravity's);
-- |xi(t_i)| >= level at the nodes t_i, the last one being the handover;
+- |xi(t_i)| >= level at the nodes t_i, the last one being the handover; where that is to be on the ellipsoid,
+  |xi| <= level there as well, which enters below with the other sign;
 - |B_j s + b_j| <= C_j at both ends of the final arc, whose thrust per mass is affine in the handover state
   s = (r, v) but for gravity: C_j = 1/m_j + sup of what gravity differs by from what b_j takes it to be;
 - S_c s + d_c in the second-order cone Q for the glide slope, at the handover and at touchdown.
@@ -45,13 +46,13 @@ from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
 
 Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+Ints = NDArray[np.int64]
 
 # Nodes at which flights are held outside the ellipsoid, and intervals of the weights between two of them.
 NODES, PER_NODE = 8, 2
 INTERVALS = NODES * PER_NODE
-# |xi| that flights keep: delivered ones may be this much below 1.
-LEVEL = 1.0 - 1e-5
+# |xi| that flights keep, and have at most at a handover on the ellipsoid: delivered ones may be so far off 1.
+LEVEL, HIGHEST = 1.0 - 1e-5, 1.0 + 1e-5
 
 
 class Descent(NamedTuple):
@@ -61,8 +62,11 @@ class Descent(NamedTuple):
     roots: Floats  # (N, K + 1, 2) R_k: R_k R_k' holds the integrals over interval k of the kernels' products
     kernels: Floats  # (N, K + 1) integrals of the kernels themselves
     drift: Floats  # (K + 1, 3) outputs of a = 0
-    axes: Floats  # (K, 3, 3) xi(t_i) from r(t_i)
-    keep_out: Floats  # (K, 3, 3) Q_i with |xi(t_i)|^2 = r'Q_i r
+    places: Ints  # (M,) outputs that are held to the ellipsoid: every node, and the last again from inside
+    outside: Floats  # (M,) 1, or -1 for a position that may be no farther out
+    levels: Floats  # (M,) of |xi|
+    axes: Floats  # (M, 3, 3) xi(t_i) from r(t_i)
+    keep_out: Floats  # (M, 3, 3) Q_i with |xi(t_i)|^2 = r'Q_i r
     least_mass: Floats  # (N,) at tau <= 1
     ends_mass: Floats  # (2,) at touchdown and at handover
     gravity: Floats  # (N,) bounds of gravity along the descent
@@ -87,7 +91,7 @@ class Weights(NamedTuple):
     """Multipliers of n facets."""
 
     thrust: Floats  # (n, N) w
-    ellipsoid: Floats  # (n, K) mu
+    ellipsoid: Floats  # (n, M) mu
     arc: Floats  # (n, 2) omega
     slope: Floats  # (n, 2, 3) z
 
@@ -115,7 +119,10 @@ def descent_of(case: LandingCase, bounds: GravityBounds) -> Descent:
     c, s = scaled.node_cos[PER_NODE::PER_NODE], scaled.node_sin[PER_NODE::PER_NODE]
     zero, one = np.zeros(NODES), np.ones(NODES)
     turns = np.moveaxis(np.array([[c, s, zero], [-s, c, zero], [zero, zero, one]]), 2, 0)
-    axes = turns * scaled.inverse_axes[:, None]
+    places = np.arange(NODES + 1 if scaled.on_ellipsoid else NODES)
+    places[NODES:] = NODES - 1
+    outside = np.where(np.arange(len(places)) < NODES, 1.0, -1.0)
+    axes = scaled.inverse_axes[:, None] * turns[places]
     used = scaled.mass_flow * np.concatenate([ends[1:], [1.0 + scaled.final_time, 1.0]])
     model = new_model(INTERVALS, len(scaled.arc_fractions) + 2, 7)
     fill_arc_cones(scaled, model)
@@ -126,6 +133,9 @@ def descent_of(case: LandingCase, bounds: GravityBounds) -> Descent:
         roots,
         h * middle,
         drift,
+        places,
+        outside,
+        np.where(outside > 0.0, LEVEL, HIGHEST),
         axes,
         axes.transpose(0, 2, 1) @ axes,
         1.0 - used[:-2],
@@ -223,20 +233,21 @@ def least_value(descent: Descent, facets: Facets, weights: Weights) -> Least:
     inverse = np.linalg.inv(gramian)
     inverse = 0.5 * (inverse + inverse.transpose(0, 2, 1))
     form = (inverse[:, :, None, :, None] * np.eye(3)[:, None, :]).reshape(n, 3 * NODES + 3, 3 * NODES + 3)
-    blocks = mu[:, :, None, None] * descent.keep_out
-    for i in range(NODES):
-        at = slice(3 * i, 3 * i + 3)
+    signed, held = descent.outside * mu, centre[:, descent.places]
+    blocks = signed[:, :, None, None] * descent.keep_out
+    pulled = applied(blocks, held)
+    linear = np.zeros((n, 3 * NODES + 3))
+    for i, place in enumerate(descent.places):
+        at = slice(3 * place, 3 * place + 3)
         form[:, at, at] -= blocks[:, i]
+        linear[:, at] -= pulled[:, i]
     maps = descent.arc_maps
     form[:, last:, last:] += (omega[:, :, None, None] * (maps.transpose(0, 2, 1) @ maps)).sum(axis=1)
     thrust = applied(maps, ends[:, None]) + facets.arc_offsets
     slopes = applied(facets.slopes, ends[:, None]) + facets.slope_offsets
-    pulled = applied(blocks, centre[:, :NODES])
-    linear = np.zeros((n, 3 * NODES + 3))
-    linear[:, : 3 * NODES] = -pulled.reshape(n, -1)
     linear[:, last:] += applied(maps.transpose(0, 2, 1), omega[:, :, None] * thrust).sum(axis=1)
     linear[:, last:] -= 0.5 * applied(facets.slopes.transpose(0, 1, 3, 2), z).sum(axis=1)
-    value = LEVEL**2 * mu.sum(axis=1) - (pulled * centre[:, :NODES]).sum(axis=(1, 2))
+    value = (signed * descent.levels**2).sum(axis=1) - (pulled * held).sum(axis=(1, 2))
     value += (omega * ((thrust**2).sum(axis=2) - facets.arc_limits**2)).sum(axis=1)
     value -= (z * slopes).sum(axis=(1, 2)) + (w * facets.accelerations**2).sum(axis=1) / INTERVALS
     volume = _log_determinants(form)
