@@ -31,6 +31,7 @@ from landing_cli.reach.keep_out_bound import (
     least_value,
     thrust_level,
 )
+from landing_cli.reach.keep_out_derivatives import derivatives
 from landing_cli.reach.margin import least_thrust_flights, thrust_levels
 from landing_cli.reach.proofs import bounds_outside
 from landing_cli.reach.records import FacetSolutions, Verdict
@@ -274,11 +275,11 @@ def test_a_climb_has_the_derivatives_of_what_it_climbs(name: str) -> None:
     def climbed(step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         moved = keep_out_ascent._moved(weights, step, np.ones(3))
         least = least_value(descent, kept, moved)
-        slope = keep_out_ascent._derivatives(descent, kept, moved, least, barrier)[0]
+        slope = derivatives(descent, kept, moved, least, barrier)[0]
         return least.value + barrier * least.volume, slope
 
     least = least_value(descent, kept, weights)
-    gradient, hessian, _ = keep_out_ascent._derivatives(descent, kept, weights, least, barrier)
+    gradient, hessian, _ = derivatives(descent, kept, weights, least, barrier)
     relative = gradient.shape[1] - 6
     for i in range(gradient.shape[1]):
         step = np.zeros_like(gradient)

@@ -19,9 +19,9 @@ from landing_cli.reach.keep_out_bound import (
     Facets,
     Least,
     Weights,
-    applied,
     least_value,
 )
+from landing_cli.reach.keep_out_derivatives import derivatives
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -129,7 +129,7 @@ def _logarithms(weights: Weights) -> Floats:
 
 def _direction(descent: Descent, facets: Facets, weights: Weights, least: Least, barrier: Floats) -> Floats:
     """Newton's step, (n, m): relative for the scalar weights, absolute for the slopes', D held."""
-    gradient, hessian, price = _derivatives(descent, facets, weights, least, barrier)
+    gradient, hessian, price = derivatives(descent, facets, weights, least, barrier)
     scalars = gradient.shape[1] - 6
     gradient[:, :scalars] += barrier[:, None]
     hessian[:, np.arange(scalars), np.arange(scalars)] -= barrier[:, None]
@@ -144,98 +144,6 @@ def _direction(descent: Descent, facets: Facets, weights: Weights, least: Least,
     up, along = found[:, :, 0], found[:, :, 1]
     held = (price * up).sum(axis=1) / (price * along).sum(axis=1)
     return np.asarray(up - held[:, None] * along)
-
-
-def _derivatives(
-    descent: Descent, facets: Facets, weights: Weights, least: Least, barrier: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Gradient (n, m) and Hessian (n, m, m) of the least value and barrier log det H; gradient (n, m) of D.
-
-    The form is H = sum V_i V_i' over thrust and arc, less that over the ellipsoid; b_i is half the gradient
-    of the i-th constraint in the outputs. The second derivatives of the least value are those of L less
-    2 b_i'H^-1 b_j.
-    """
-    w, mu, omega, _ = weights
-    n, m, last = *mu.shape, 3 * (NODES - 1)
-    second, scalars = INTERVALS + m, INTERVALS + m + 2
-    sign = np.concatenate([np.ones(INTERVALS), -descent.outside, np.ones(2)])
-    outputs = least.outputs
-    ends = outputs.reshape(n, -1)[:, last:]
-    # relative changes of w change G^-1 by D_k D_k'
-    roots = descent.roots.transpose(1, 0, 2) / np.sqrt(w)[:, None, :, None]
-    pulls = (least.inverse_gramian @ roots.reshape(n, NODES + 1, -1)).reshape(roots.shape)
-    flat_pulls, flat_roots = pulls.reshape(n, NODES + 1, -1), roots.reshape(n, NODES + 1, -1)
-    parts = (flat_pulls.transpose(0, 2, 1) @ (outputs - facets.centre)).reshape(n, INTERVALS, 2, 3)
-    xi = applied(descent.axes, outputs[:, descent.places])
-    thrust = applied(descent.arc_maps, ends[:, None]) + facets.arc_offsets
-    slopes = applied(facets.slopes, ends[:, None]) + facets.slope_offsets
-    energies = (parts**2).sum(axis=(2, 3))
-    prices = (w * facets.accelerations**2 / INTERVALS, omega * facets.arc_limits**2)
-    gradient = np.concatenate(
-        [
-            energies - prices[0],
-            descent.outside * mu * (descent.levels**2 - (xi**2).sum(axis=2)),
-            omega * (thrust**2).sum(axis=2) - prices[1],
-            -slopes.reshape(n, -1),
-        ],
-        axis=1,
-    )
-    price = np.zeros_like(gradient)
-    price[:, :INTERVALS], price[:, second:scalars] = prices
-
-    # the other weights' columns V, ellipsoid and arc
-    columns = np.zeros((n, 3 * NODES + 3, 3 * m + 6))
-    for i, place in enumerate(descent.places):
-        at = slice(3 * place, 3 * place + 3)
-        columns[:, at, 3 * i : 3 * i + 3] = np.sqrt(mu)[:, i, None, None] * descent.axes[i].T
-    arc = np.sqrt(omega)[:, None, :, None] * descent.arc_maps.transpose(2, 0, 1)
-    columns[:, last:, 3 * m :] = arc.reshape(n, 6, 6)
-    inverse = np.linalg.inv(least.form)
-    by_axes = inverse.reshape(n, NODES + 1, 3, NODES + 1, 3).transpose(0, 2, 4, 1, 3)
-    turned_pulls = flat_pulls.transpose(0, 2, 1)
-    own = turned_pulls[:, None, None] @ by_axes @ flat_pulls[:, None, None]
-    solved = inverse @ columns
-    mixed = turned_pulls @ solved.reshape(n, NODES + 1, -1)
-    others = columns.transpose(0, 2, 1) @ solved
-    squares = np.empty((n, scalars, scalars))
-    squares[:, :INTERVALS, :INTERVALS] = _block_sums((own**2).sum(axis=(1, 2)), 2, 2)
-    squares[:, INTERVALS:, INTERVALS:] = _block_sums(others**2, 3, 3)
-    crossed = (mixed.reshape(n, 2 * INTERVALS, 3, -1) ** 2).sum(axis=2)
-    squares[:, :INTERVALS, INTERVALS:] = _block_sums(crossed, 2, 3)
-    squares[:, INTERVALS:, :INTERVALS] = squares[:, :INTERVALS, INTERVALS:].transpose(0, 2, 1)
-    own = np.trace(own, axis1=1, axis2=2)
-    traces = np.concatenate(
-        [
-            np.diagonal(own, axis1=1, axis2=2).reshape(n, -1, 2).sum(axis=2),
-            np.diagonal(others, axis1=1, axis2=2).reshape(n, -1, 3).sum(axis=2),
-        ],
-        axis=1,
-    )
-    held = -(descent.outside * np.sqrt(mu))[:, :, None] * xi
-    factors = np.concatenate([held, np.sqrt(omega)[:, :, None] * thrust], axis=1)
-    halves = np.zeros((n, 3 * NODES + 3, scalars + 6))
-    pulled = (pulls[:, :, :, :, None] * parts[:, None]).sum(axis=3)
-    halves[:, :, :INTERVALS] = pulled.transpose(0, 1, 3, 2).reshape(n, -1, INTERVALS)
-    moved = columns * factors.reshape(n, 1, -1)
-    halves[:, :, INTERVALS:scalars] = moved.reshape(n, -1, m + 2, 3).sum(axis=3)
-    halves[:, last:, scalars:] = -0.5 * facets.slopes.reshape(n, 6, 6).transpose(0, 2, 1)
-    hessian = -2.0 * halves.transpose(0, 2, 1) @ (inverse @ halves)
-    hessian[:, :scalars, :scalars] -= barrier[:, None, None] * sign[:, None] * sign * squares
-    gradient[:, :scalars] += barrier[:, None] * sign * traces
-    # G^-1 is not linear in w
-    cross = flat_roots.transpose(0, 2, 1) @ flat_pulls
-    flat_parts = parts.reshape(n, -1, 3)
-    cross *= flat_parts @ flat_parts.transpose(0, 2, 1) + barrier[:, None, None] * own
-    hessian[:, :INTERVALS, :INTERVALS] += 2.0 * _block_sums(cross, 2, 2)
-    each = np.arange(INTERVALS)
-    hessian[:, each, each] -= 2.0 * (energies + barrier[:, None] * traces[:, :INTERVALS])
-    return gradient, 0.5 * (hessian + hessian.transpose(0, 2, 1)), price
-
-
-def _block_sums(matrices: Floats, rows: int, columns: int) -> Floats:
-    """Add up the elements of each block, (n, r, c) by (rows, columns)."""
-    n, r, c = matrices.shape
-    return np.asarray(matrices.reshape(n, r // rows, rows, c // columns, columns).sum(axis=(2, 4)))
 
 
 def _step(

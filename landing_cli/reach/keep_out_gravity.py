@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import signed_distances
 from landing_cli.body.gravity.field import GravityField, GravityKind
-from landing_cli.body.gravity.field_values import accelerations, accelerations_and_gradients
+from landing_cli.body.gravity.field_values import accelerations, gradients
 from landing_cli.reach.keep_out_bound import INTERVALS, NODES, PER_NODE, Descent, Facets, Least, applied
 from landing_cli.reach.sides import OCTAHEDRON, quarters
 
@@ -155,7 +155,8 @@ def _largest_change(field: GravityField, centre_m: Floats, radius_m: Floats, gra
     patches /= np.linalg.norm(patches, axis=1, keepdims=True)
     reach = np.linalg.norm(triangles - patches[:, None], axis=2).max(axis=1)
     points = centre_m[:, None] + radius_m[:, None, None] * patches
-    met, slopes = accelerations_and_gradients(field, points.reshape(-1, 3))
-    change = np.linalg.norm(met.reshape(points.shape) - gravity[:, None], axis=2)
-    steepest = np.linalg.norm(slopes.reshape(*points.shape[:2], 9), axis=2)
+    met = accelerations(field, points.reshape(-1, 3)).reshape(points.shape)
+    change = np.linalg.norm(met - gravity[:, None], axis=2)
+    slopes = gradients(field, points.reshape(-1, 3)).reshape(*points.shape[:2], 9)
+    steepest = np.linalg.norm(slopes, axis=2)
     return np.asarray((change + _GRADIENT_MARGIN * radius_m[:, None] * reach * steepest).max(axis=1))
