@@ -59,8 +59,9 @@ def domains(runs: Runs) -> str:
 
 Every facet of every case is solved (`method: traverse`) with free control. "Proved" is the share of the unreachable
 facets for which a dual bound shows that no control reaches them; the others were searched without success. Where
-the keep-out ellipsoid, not the thrust, stops a facet, the sides on which flights may pass it are covered by planes,
-and all of them must be bounded; strong gravity blurs these bounds (Eros). Of {totals[0]} facets in all cases
+the keep-out ellipsoid, not the thrust, stops a facet, one quadratic Lagrangian bounds the flights on all its sides at
+once, with gravity as it can be where they must be; where flights on several sides need about the same thrust it falls
+short, and the sides are covered by planes and bounded one by one. Of {totals[0]} facets in all cases
 together, {totals[1]} are unreachable ({percent(totals[2], totals[1])} of these proved) and {totals[3]} unresolved.
 
 {table(columns, rows)}

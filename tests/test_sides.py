@@ -12,7 +12,7 @@ from landing_samples import asteroid, landing_case
 from truth.tables import landing_case as true_case, read_table
 
 from landing_cli.optimize.conic_records import new_model
-from landing_cli.reach import sides
+from landing_cli.reach import proofs, sides
 from landing_cli.reach.certificate import certified_thrust_level
 from landing_cli.reach.descent_model import (
     fill_arc_cones as fill_arc_cones_part,
@@ -48,7 +48,7 @@ CASES: dict[str, dict[str, Any]] = {
 def solved(name: str) -> tuple[PreparedCase, np.ndarray]:
     case = landing_case(asteroid(gravity=2.0, spin=2.0), **CASES[name])
     p = prepare(case, survey(case))
-    return p, sides.with_proofs(p, solve_prepared(p, np.arange(len(p.shared.normals)))).rows
+    return p, proofs.with_proofs(p, solve_prepared(p, np.arange(len(p.shared.normals)))).rows
 
 
 def anything(facets: np.ndarray) -> np.ndarray:

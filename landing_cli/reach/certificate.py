@@ -235,8 +235,8 @@ def certified_thrust_level(
             if case.arc_fractions[j] == 0.0:
                 gx, gy, gz = gravity_on_arc(case, target[0], target[1], target[2])
                 work += z[1] * gx + z[2] * gy + z[3] * gz
-            else:
-                work -= z[0] * arc_bound
+            else:  # the handover is outside the ellipsoid
+                work -= z[0] * (tube[-1] if case.arc_fractions[j] == 1.0 else arc_bound)
     return work / by_thrust
 
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from landing_cli.reach.free_descent import PreparedCase, solve_prepared
 from landing_cli.reach.free_stage import solve_free_stage
 from landing_cli.reach.least_thrust import with_margin
+from landing_cli.reach.proofs import with_proofs
 from landing_cli.reach.records import FacetSolutions, join
-from landing_cli.reach.sides import with_proofs
 
 Items = NDArray[np.int64]
 

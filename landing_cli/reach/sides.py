@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from landing_cli.reach.certificate import gravity_tube
 from landing_cli.reach.free_batch import Batch, CutBatch, new_batch, no_walls, solve_many
 from landing_cli.reach.free_solve import CERTIFIED, new_solver
-from landing_cli.reach.records import Binding, FacetSolutions, Verdict
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
 
 if TYPE_CHECKING:
@@ -47,7 +46,7 @@ MOST_FAMILIES, MOST_PLANES, LIMIT = 40, 6, 30
 NEVER, MARGIN_WEIGHT = 1 << 30, 1e-3
 
 _SIGNS = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)], dtype=np.float64)
-_OCTAHEDRON = _SIGNS[:, :, None] * np.eye(3)  # (8, 3, 3) corners of its triangles
+OCTAHEDRON = _SIGNS[:, :, None] * np.eye(3)  # (8, 3, 3) corners of its triangles
 
 
 class Branch(NamedTuple):
@@ -75,34 +74,6 @@ class Relaxations:
     arc_bound: float
     targets: Floats  # (n, 3) scaled
     normals: Floats  # (n, 3)
-
-
-def with_proofs(prepared: PreparedCase, solutions: FacetSolutions) -> FacetSolutions:
-    """Prove unreachable, where it works out, what the ellipsoid alone stops.
-
-    Parameters
-    ----------
-    prepared : PreparedCase
-        The case.
-    solutions : FacetSolutions
-        Its answers.
-
-    Returns
-    -------
-    FacetSolutions
-        The same with more rows proved.
-    """
-    rows = solutions.rows
-    stopped = (rows["verdict"] == Verdict.UNREACHABLE) & (rows["proved"] == 0)
-    places = np.flatnonzero(stopped & (rows["binding"] == Binding.ELLIPSOID))
-    if len(places) == 0:
-        return solutions
-    levels = 1.0 + rows["violation"][places]
-    bounds, iterations = bounds_around(prepared, rows["facet"][places].astype(np.int64), levels)
-    rows = rows.copy()
-    rows["proved"][places] = bounds > 1.0
-    rows["iterations"][places] += iterations
-    return FacetSolutions(rows, solutions.thrust_nodes_n)
 
 
 def bounds_around(prepared: PreparedCase, facets: Ints, levels: Floats) -> tuple[Floats, Ints]:
@@ -162,9 +133,14 @@ def bounds_around(prepared: PreparedCase, facets: Ints, levels: Floats) -> tuple
 
 
 def _hopeless(family: list[Branch], solved: Batch, levels: Floats) -> Flags:
-    """Whether branches have no more room for planes, or facets levels that no bound can tell from 1."""
+    """Whether branches have no more room for planes, or facets levels that no bound can tell from 1.
+
+    A bound lies below its relaxation's level by what gravity may do along the multipliers, which is about as
+    much in all of a facet's relaxations.
+    """
     planes = np.array([len(branch.nodes) for branch in family])
-    blurred = solved.level >= levels[[branch.place for branch in family]] * solved.bound
+    blur = solved.level - solved.bound
+    blurred = levels[[branch.place for branch in family]] - blur <= 1.0
     return np.asarray((planes == MOST_PLANES) | (planes == 0) & blurred)
 
 
@@ -172,12 +148,12 @@ def _children(opened: Open) -> list[Branch]:
     """Cover the flights of a branch: by eight triangles at a new node, or by four in place of an old one."""
     place, nodes, triangles = opened.branch
     if opened.node not in nodes:
-        cover = _OCTAHEDRON @ _frame_about(opened.direction)
+        cover = OCTAHEDRON @ _frame_about(opened.direction)
         return [Branch(place, (*nodes, opened.node), (*triangles, triangle)) for triangle in cover]
     at = nodes.index(opened.node)
     return [
         Branch(place, nodes, (*triangles[:at], part, *triangles[at + 1 :]))
-        for part in _quarters(triangles[at])
+        for part in quarters(triangles[at])
     ]
 
 
@@ -189,7 +165,7 @@ def _frame_about(direction: Floats) -> Floats:
     return np.stack([across, np.cross(direction, across), direction])
 
 
-def _quarters(triangle: Floats) -> list[Floats]:
+def quarters(triangle: Floats) -> list[Floats]:
     """Cut a spherical triangle in four at the middles of its sides."""
     a, b, c = triangle
     middles = np.stack([a + b, b + c, c + a])
