@@ -10,7 +10,8 @@ with nu the outward normals of the edges in the facet's plane, L_e their logarit
 Werner & Scheeres drop h K from the gradient, since it vanishes in the sum over a closed surface. Kept, the
 derivatives of a sum over any facets are those of one potential::
 
-    2 g / (G rho) = h K - n I,    2 dg/dx / (G rho) = h H - n K' - K n',    H = n (dw/dx)' - sum_e nu (dL_e/dx)'
+    2 g / (G rho) = h K - n I,    2 dg/dx / (G rho) = h H - n K' - K n'
+    H = dK/dx = n (dw/dx)' - sum_e nu (dL_e/dx)'
 
 For an edge from a to b, as the point sees them, and q = 1/(|a||b| + a.b), dL/dx = e (a/|a| + b/|b|) q and its
 share of dw/dx is (a x b)(1/|a| + 1/|b|) q: no logarithm is taken twice.
@@ -166,7 +167,7 @@ def facet_gradient(table: FloatArray, k: int, x: float, y: float, z: float) -> V
 def fill_gradients(
     table: FloatArray, chosen: NDArray[np.int64], points: FloatArray, g: FloatArray, G: FloatArray
 ) -> None:
-    """Write gradients (k, 3) and Hessians (k, 3, 3) of U, times 2/(G rho), of chosen facets at points (k, 3)."""
+    """Write gradient (k, 3) and Hessian (k, 3, 3) of U, times 2/(G rho), of chosen facets at points."""
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         gx = gy = gz = xx = yy = zz = xy = xz = yz = 0.0
@@ -226,7 +227,10 @@ def _edge_slope(
 def facet_curvature(
     table: FloatArray, k: int, x: float, y: float, z: float, lx: float, ly: float, lz: float
 ) -> Symmetric:
-    """Return the derivative of the Hessian of U along l, times 2/(G rho): h H l - n (H l)' - (H l) n' - (n.l) H."""
+    """Return the derivative of the Hessian of U along l, times 2/(G rho).
+
+    It is h dH - n (H l)' - (H l) n' - (n.l) H, with dH that of H along l.
+    """
     ax, ay, az, a = from_point(table, k, x, y, z)
     bx, by, bz, b = from_point(table, k + 3, x, y, z)
     cx, cy, cz, c = from_point(table, k + 6, x, y, z)

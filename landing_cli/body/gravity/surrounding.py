@@ -1,8 +1,8 @@
 """A polyhedron's field around the whole body: near facets exactly, far ones as polynomials.
 
-Space is divided into cubes (`surrounding_pieces`), inside the body too: the field is as good at the surface as
-far off. Within a piece acceleration and gradient are derivatives of one potential; from one piece to the next
-it jumps by no more than its error. Far off it is one expansion.
+Space is divided into cubes (`surrounding_pieces`), inside the body too: the field is as good at the surface
+as far off. Within a piece acceleration and gradient are derivatives of one potential; from one piece to the
+next it jumps by no more than its error. Far off one expansion holds.
 """
 
 from __future__ import annotations
@@ -18,7 +18,15 @@ from landing_cli.body.gravity.field_values import accelerations_and_gradients
 from landing_cli.body.gravity.fitted_pieces import probe_points
 from landing_cli.body.gravity.kernel_types import FloatArray
 from landing_cli.body.gravity.surrounding_kernels import ERROR, HEADER
-from landing_cli.body.gravity.surrounding_pieces import FINE, Body, IntArray, Mapped, Piece, divide, outer_coefficients
+from landing_cli.body.gravity.surrounding_pieces import (
+    FINE,
+    Body,
+    IntArray,
+    Mapped,
+    Piece,
+    divide,
+    outer_coefficients,
+)
 from landing_cli.errors import InputRefused
 
 OUTER = 2.0
@@ -94,9 +102,7 @@ def surrounding_field(polyhedron: GravityField, mapped: Mapped = map) -> Surroun
     half = least * 2.0 ** math.ceil(math.log2(outer / least))
     tree, pieces = divide(body, half, outer, mapped)
     params = _packed(body, half, outer, tree, pieces)
-    error, gradient_error, points = _measured(
-        GravityField(GravityKind.INTERPOLATED, params), body, pieces
-    )
+    error, gradient_error, points = _measured(GravityField(GravityKind.INTERPOLATED, params), body, pieces)
     params[ERROR] = error
     field = GravityField(GravityKind.INTERPOLATED, params)
     near = float(np.mean([len(piece.near) for piece in pieces]))

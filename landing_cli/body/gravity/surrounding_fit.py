@@ -49,7 +49,9 @@ class Polynomial:
         half : float, m
             Half the cube's side.
         u : float, m2/s2
+            U in the middle.
         g : (k, 3) float, m/s2
+            Gradients.
         G : (k, 3, 3) float, 1/s2, or None
             Where the polynomial is fitted by gradients alone.
 
@@ -95,7 +97,9 @@ def outer_polynomial(degree: int) -> Polynomial:
     height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     turn = np.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
     across = np.sqrt(1.0 - height**2)
-    return _fit_at(np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1), degree, True, False)
+    return _fit_at(
+        np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1), degree, True, False
+    )
 
 
 def _fit_at(points: FloatArray, degree: int, harmonic: bool, hessians: bool = True) -> Polynomial:

@@ -1,10 +1,11 @@
 """Evaluation of a field around a whole body: near facets exactly, the rest as a polynomial.
 
-The parameters are where the polyhedron's own begin and where the coefficients begin, half the side of the cube
-that is divided, the radius beyond which one expansion holds, the error that was measured, GM; then the tree: at
-every node the first of its eight children, which follow each other, or less the place of its piece, or 0. Then
-come the facets (`facet_potential`), the pieces (where their coefficients are, 1 or 0 for GM/r, how many facets are near,
-and where those are), the coefficients, those of the outer expansion first, and the polyhedron.
+The parameters are where the polyhedron's own begin and where the coefficients begin, half the side of the
+cube that is divided, the radius beyond which one expansion holds, the error that was measured, and GM. Then
+comes the tree: at every node the first of its eight children, which follow each other, or less the place of
+its piece, or 0; then the facets (`facet_potential`), the pieces (where their coefficients are, 1 or 0 for
+GM/r, how many facets are near, and where those are), the coefficients, those of the outer expansion first,
+and the polyhedron.
 
 U of a piece is GM/r or that of its near facets, and the polynomial; all else is derived from it. Beyond the
 radius D it is (D/r) V(y) with V a harmonic polynomial of y = D x/r^2, by Kelvin's inversion: the exterior
@@ -67,7 +68,7 @@ def _degree(params: Params, c: int) -> int:
 
 @kernel
 def _polynomial_pull(params: Params, c: int, degree: int, px: Any, py: Any, pz: Any) -> Any:
-    """Return the polynomial whose coefficients begin at ``c``, and its gradient; complex at a complex point."""
+    """Return the polynomial whose coefficients begin at ``c``, and its gradient; also at complex points."""
     zero = 0.0 * px
     f = fx = fy = fz = zero
     for i in range(degree + 1):
@@ -192,7 +193,10 @@ def surrounding_potential(params: Params, x: float, y: float, z: float) -> float
     c, px, py, pz, _h = _piece_at(params, x, y, z)
     if c == 0:
         return polyhedron_potential(params[int(params[0]) :], x, y, z)
-    return _pull(params, c, x, y, z)[0] + _polynomial_pull(params, int(params[c]), _degree(params, c), px, py, pz)[0]
+    return (
+        _pull(params, c, x, y, z)[0]
+        + _polynomial_pull(params, int(params[c]), _degree(params, c), px, py, pz)[0]
+    )
 
 
 @kernel

@@ -5,7 +5,8 @@ it. In the first case U - GM/r, in the second U without its near facets (`facet_
 cube: its gradient and Hessian are fitted, by least squares, by a polynomial in the coordinates of the cube,
 -1 to 1. The exact field is asked for where cubes are large, as few are. The small ones inherit their parents'
 polynomials, which they hold exactly, and add that of the facets that were near the parent and are far from
-the child (the downward pass of the fast multipole method, Greengard & Rokhlin 1987, with fits for multipoles).
+the child: the downward pass of the fast multipole method (Greengard & Rokhlin 1987), with least-squares fits
+in place of multipoles.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ _ROOM = 1.5  # small cubes where facets are smaller than elsewhere
 _LARGE = 5.0  # in small cubes: what asks for the exact field is up to so large
 _MOST_NEAR = 110  # facets near a piece
 _FAR, _WIDE, _NEAR, _LEAST = 2.3, 3.0, 2.75, 2.0
-"""How far facets are near a cube, in halves of its side: of a large cube, where none may be near and where some
-are; of a smaller one; and of a small one, if it would else be near too many."""
+"""How far facets are near a cube, in halves of its side: a large one, where none may be near and where some
+are; a smaller one; and a small one, if it would else be near too many."""
 _MOST_DIVISIONS = 40
 
 
@@ -230,7 +231,7 @@ def _grown(body: Body, given: tuple[Cube, IntArray]) -> tuple[IntArray, list[Pie
 def outer_coefficients(body: Body, distance: float) -> FloatArray:
     """Fit (r/D) U as a harmonic polynomial of y = D x/r^2 on the sphere of radius D, where y = x/D.
 
-    Of V = (r/D) U the derivative along y is -(D g.n + U) there, and across it is D times that of U; V(0) = GM/D.
+    Of V = (r/D) U the derivative along y is -(D g.n + U) there, that across it is D times U's; V(0) = GM/D.
 
     Parameters
     ----------
