@@ -1,4 +1,4 @@
-"""The field around a whole body against the polyhedron that it stands for, and its parts against closed forms."""
+"""The field around a whole body against the polyhedron that it stands for, and its parts."""
 
 from __future__ import annotations
 
@@ -85,7 +85,9 @@ def shares(values: np.ndarray, exact: np.ndarray) -> np.ndarray:
 
 def test_facets_add_up_to_the_polyhedron_outside_and_inside() -> None:
     up = facet_centroids(POTATO) + 5.0 * facet_normals(POTATO)
-    points = np.concatenate([points_around(450.0, 5), points_around(1500.0, 5), points_around(90.0, 5), up[:5]])
+    points = np.concatenate(
+        [points_around(450.0, 5), points_around(1500.0, 5), points_around(90.0, 5), up[:5]]
+    )
     all_of_it = summed(np.arange(len(TABLE)), points)
     assert share(all_of_it[:, 0], potentials(EXACT, points)) < 1e-13
     assert share(all_of_it[:, 1:4], accelerations(EXACT, points)) < 1e-12
@@ -167,7 +169,12 @@ def test_values_are_derivatives_of_one_potential(fitted: SurroundingField) -> No
     """By central differences about points well inside a piece, among facets, far from them, and beyond."""
     field, params = fitted.field, fitted.field.params
     up = facet_centroids(POTATO)[7] + 11.0 * facet_normals(POTATO)[7]
-    for place, h in ((up, 1e-3), (up + 30.0, 1e-3), (np.array([431.0, 377.0, 203.0]), 1e-2), (8e2 * up, 10.0)):
+    for place, h in (
+        (up, 1e-3),
+        (up + 30.0, 1e-3),
+        (np.array([431.0, 377.0, 203.0]), 1e-2),
+        (8e2 * up, 10.0),
+    ):
         steps = h * np.eye(3)
         by_u = [(potentials(field, [place + e]) - potentials(field, [place - e]))[0] / (2 * h) for e in steps]
         g, G = accelerations_and_gradients(field, [place])
@@ -214,7 +221,7 @@ def test_what_cannot_be_fitted_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
     with pytest.raises(InputRefused, match="point_mass field is not worth"):
         surrounding_field(point_mass_field(5.0))
     monkeypatch.setattr(surrounding, "MOST_FACETS", 100)
-    with pytest.raises(InputRefused, match="facets are too many.*at most 100"):
+    with pytest.raises(InputRefused, match=r"facets are too many.*at most 100"):
         surrounding_field(EXACT)
 
 
@@ -282,5 +289,7 @@ def test_where_nothing_can_be_kept_the_field_is_made_all_the_same(
     assert kept.kept_interpolation(TETRAHEDRON, FACES).kind is GravityKind.INTERPOLATED
 
 
-TETRAHEDRON = np.array([[100.0, 100.0, 100.0], [-100.0, -100.0, 100.0], [-100.0, 100.0, -100.0], [100.0, -100.0, -100.0]])
+TETRAHEDRON = np.array(
+    [[100.0, 100.0, 100.0], [-100.0, -100.0, 100.0], [-100.0, 100.0, -100.0], [100.0, -100.0, -100.0]]
+)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])

@@ -18,13 +18,37 @@ import llvmlite.binding  # type: ignore[import-untyped]
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from landing_cli.body.gravity import surrounding
+from landing_cli.body.gravity import (
+    facet_potential,
+    field_values,
+    fitted_pieces,
+    point_mass,
+    polyhedron,
+    polyhedron_records,
+    surrounding,
+    surrounding_fit,
+    surrounding_kernels,
+    surrounding_pieces,
+)
 from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.polyhedron import polyhedron_field
 from landing_cli.body.gravity.surrounding_checks import is_sound
 from landing_cli.sources.whole_file import write_whole
 
 MOST_KEPT = 8  # files, of some tens of megabytes
+# whose code decides the numbers
+_MAKERS = (
+    facet_potential,
+    field_values,
+    fitted_pieces,
+    point_mass,
+    polyhedron,
+    polyhedron_records,
+    surrounding,
+    surrounding_fit,
+    surrounding_kernels,
+    surrounding_pieces,
+)
 _SUFFIX = ".field"
 _DIGEST = hashlib.sha256().digest_size
 
@@ -50,12 +74,12 @@ def kept_interpolation(vertices: ArrayLike, faces: ArrayLike) -> GravityField:
     InputRefused
         If the mesh is no body, or has too many facets.
     """
-    polyhedron = polyhedron_field(vertices, faces, 1.0)
-    folder, name = cache_folder(), _name(polyhedron) + _SUFFIX
+    exact = polyhedron_field(vertices, faces, 1.0)
+    folder, name = cache_folder(), _name(exact) + _SUFFIX
     params = _read(folder / name)
     if params is None:
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            params = surrounding.surrounding_field(polyhedron, pool.map).field.params
+            params = surrounding.surrounding_field(exact, pool.map).field.params
         _keep(folder, name, params)
     return GravityField(GravityKind.INTERPOLATED, params)
 
@@ -66,11 +90,11 @@ def cache_folder() -> Path:
     return Path(given) / "landing" / "fields"
 
 
-def _name(polyhedron: GravityField) -> str:
+def _name(exact: GravityField) -> str:
     digest = hashlib.sha256(llvmlite.binding.get_host_cpu_name().encode())
-    for source in sorted(Path(surrounding.__file__).parent.glob("*.py")):
-        digest.update(source.read_bytes())
-    digest.update(polyhedron.params.tobytes())
+    for module in _MAKERS:
+        digest.update(Path(str(module.__file__)).read_bytes())
+    digest.update(exact.params.tobytes())
     return digest.hexdigest()[:32]
 
 

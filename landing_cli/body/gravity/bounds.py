@@ -28,6 +28,9 @@ _SECOND_ORDER_MARGIN = 2.0  # covers the change of the second derivative within 
 _MOST_PATCHES = 200_000
 _LEAST_ANGLE = 1e-5
 _ROUNDING = 1e-12
+_TURN = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]) @ np.array(
+    [[1.0, 0.0, 0.0], [0.0, 12 / 13, -5 / 13], [0.0, 5 / 13, 12 / 13]]
+)
 
 
 def largest_acceleration_outside(
@@ -147,6 +150,10 @@ def _bound_on_surface(
     """
     # a writable copy, as the solvers have: the kernels compile once
     triangles, params = _sphere_triangles(), field.params.copy()
+    if field.kind in (GravityKind.POLYHEDRON, GravityKind.INTERPOLATED):
+        # a vertex on the least ellipsoid lies where octants meet or in the middle of one: no patch may have
+        # its centre there, where the second derivative is infinite, however often it is split
+        triangles = triangles @ _TURN
     while True:
         directions, angles = _centres(triangles)
         sizes, ceilings, reaches = np.zeros((3, len(triangles)))
