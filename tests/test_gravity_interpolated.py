@@ -51,7 +51,7 @@ def largest_share(values: np.ndarray, exact: np.ndarray) -> float:
 
 
 def test_the_field_is_the_polyhedrons_within_the_measured_error(fitted: InterpolatedField) -> None:
-    assert fitted.field.kind is GravityKind.INTERPOLATED
+    assert fitted.field.kind is GravityKind.BOXED
     assert 0.0 < fitted.error < 5.0 * TOLERANCE
     assert fitted.covered > 0.8 and fitted.pieces > 1 and fitted.checked_points == 40 * fitted.pieces
     points = points_in_box(3000)

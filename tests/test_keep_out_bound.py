@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from landing_samples import asteroid, landing_case
-from truth.tables import landing_case as true_case
-from truth.tables import read_table
+from truth.tables import landing_case as true_case, read_table
 
 from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.optimize.conic_records import new_model
 from landing_cli.reach import keep_out_ascent, keep_out_bound
-from landing_cli.reach.descent_model import fill_glide_cones
+from landing_cli.reach.descent_model import fill_glide_cones as fill_glide_cones_part
 from landing_cli.reach.free_descent import PreparedCase, prepare, solve_prepared, survey
 from landing_cli.reach.keep_out_ascent import climb, first_weights
 from landing_cli.reach.keep_out_bound import (
@@ -35,7 +35,10 @@ from landing_cli.reach.keep_out_derivatives import derivatives
 from landing_cli.reach.margin import least_thrust_flights, thrust_levels
 from landing_cli.reach.proofs import bounds_outside
 from landing_cli.reach.records import FacetSolutions, Verdict
-from landing_cli.reach.shooting import fly_accurately
+from landing_cli.reach.shooting import fly_accurately as fly_accurately_part
+
+fill_glide_cones = from_python(fill_glide_cones_part)
+fly_accurately = from_python(fly_accurately_part)
 
 CASES: dict[str, dict[str, Any]] = {
     "outside": {"position_m": np.array([300.0, 100.0, 650.0]), "tof_s": 780.0},

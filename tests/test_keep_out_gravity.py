@@ -6,9 +6,9 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from kernel_calls import from_python
 from landing_samples import SPIN_RAD_S, asteroid, landing_case, rock
-from truth.tables import landing_case as true_case
-from truth.tables import read_table
+from truth.tables import landing_case as true_case, read_table
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.dipole import dipole_field
@@ -32,8 +32,11 @@ from landing_cli.reach.keep_out_bound import (
 from landing_cli.reach.keep_out_gravity import BALLS, with_known_gravity
 from landing_cli.reach.margin import least_thrust_flights
 from landing_cli.reach.records import Verdict
-from landing_cli.reach.scaled_case import gravity_in_space
-from landing_cli.reach.shooting import fly_accurately
+from landing_cli.reach.scaled_case import gravity_in_space as gravity_in_space_part
+from landing_cli.reach.shooting import fly_accurately as fly_accurately_part
+
+fly_accurately = from_python(fly_accurately_part)
+gravity_in_space = from_python(gravity_in_space_part)
 
 ROCKS = {"rock": {"tof_s": 720.0}, "short stage": {"tof_s": 700.0, "final_stage_s": 90.0}}
 BODIES = (*ROCKS, "eros")

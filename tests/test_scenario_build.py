@@ -10,6 +10,7 @@ from scenario_samples import MINIMAL, OCTAHEDRON, SHIPPED, write_minimal
 
 from landing_cli.body.gravity.dipole import dipole_field
 from landing_cli.body.gravity.field import GravityKind
+from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.body.mass_properties import mass_properties
 from landing_cli.errors import InputRefused
 from landing_cli.scenario.build import Built, build, builder_over, read_surface
@@ -49,11 +50,26 @@ def test_the_body_is_moved_to_its_centre_of_mass_unless_told_otherwise(tmp_path:
     assert left.vertices[0, 0] == 320
 
 
-@pytest.mark.parametrize("model", ["point_mass", "harmonics", "dipole", "polyhedron"])
-def test_every_gravity_model_is_built(tmp_path: Path, model: str) -> None:
+@pytest.mark.parametrize("model", ["point_mass", "harmonics", "dipole", "polyhedron", "interpolated"])
+def test_every_gravity_model_is_built(tmp_path: Path, model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # where a fit is kept
     field = built(tmp_path, f"body.gravity={{model: {model}, gm_m3_s2: 2.7}}").asteroid.gravity
     assert field.kind.name == model.upper()
     assert np.isfinite(field.params).all()
+
+
+def test_a_fitted_field_follows_the_scenarios_mass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    points = np.array([[400.0, 100.0, 50.0], [160.0, 30.0, 20.0], [0.0, 0.0, 900.0]])
+    for gm in (2.7, 3.1):
+        fitted, exact = (
+            built(tmp_path, f"body.gravity={{model: {model}, gm_m3_s2: {gm}}}").asteroid.gravity
+            for model in ("interpolated", "polyhedron")
+        )
+        exact_g = accelerations(exact, points)
+        np.testing.assert_allclose(
+            accelerations(fitted, points), exact_g, rtol=0, atol=1e-6 * np.abs(exact_g).max()
+        )
 
 
 def test_given_coefficients_replace_those_of_the_mesh(tmp_path: Path) -> None:

@@ -8,6 +8,8 @@ import numpy as np
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.field import GravityField, GravityKind
+from landing_cli.body.gravity.kernel_types import FloatArray
+from landing_cli.body.gravity.surrounding_checks import is_sound
 from landing_cli.body.mesh import facet_areas
 from landing_cli.flight.spacecraft import Spacecraft
 
@@ -106,10 +108,16 @@ def _check_gravity(field: GravityField) -> None:
     params = field.params
     bounded("gravity_params", params, _LARGEST["gravity_params"])
     if field.kind is GravityKind.POLYHEDRON:
-        sizes = params[:2] if len(params) >= 3 else np.array([-1.0])
-        expected = 3 + 27 * sizes[0] + 20 * sizes[-1]  # the records of polyhedron_records
-        fits = (sizes >= 0).all() and (sizes == np.floor(sizes)).all() and len(params) == expected
+        fits = _is_polyhedron(params)
+    elif field.kind is GravityKind.INTERPOLATED:
+        fits = is_sound(params) and _is_polyhedron(params[int(params[0]) :])
     else:
-        fits = len(params) == _PARAMETERS.get(field.kind, -1)  # a body's own field is no interpolation
+        fits = len(params) == _PARAMETERS.get(field.kind, -1)  # a body's own field holds in no box alone
     if not fits:
         raise ValueError(f"{len(params)} gravity parameters do not fit the model {field.kind.name.lower()}")
+
+
+def _is_polyhedron(params: FloatArray) -> bool:
+    sizes = params[:2] if len(params) >= 3 else np.array([-1.0])
+    expected = 3 + 27 * sizes[0] + 20 * sizes[-1]  # the records of polyhedron_records
+    return bool((sizes >= 0).all() and (sizes == np.floor(sizes)).all() and len(params) == expected)

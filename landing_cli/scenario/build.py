@@ -16,6 +16,7 @@ from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.harmonics import harmonics_field
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.body.gravity.polyhedron import polyhedron_field
+from landing_cli.body.gravity.scaled_field import scaled_field
 from landing_cli.body.mass_properties import centred, mass_properties
 from landing_cli.body.mesh import FloatArray, Mesh
 from landing_cli.errors import InputRefused
@@ -29,8 +30,10 @@ from landing_cli.scenario.schema_body import (
     Body,
     DipoleGravity,
     HarmonicsGravity,
+    InterpolatedGravity,
     PointMassGravity,
 )
+from landing_cli.sources.kept_interpolation import kept_interpolation
 from landing_cli.sources.shape_files import read_shape
 from landing_cli.sources.shape_search import find_shape
 
@@ -299,7 +302,16 @@ def _gravity_field(gravity: AnyGravity, gm_m3_s2: float, mesh: Mesh) -> GravityF
         return _harmonics(gravity, gm_m3_s2, mesh)
     if isinstance(gravity, DipoleGravity):
         return _dipole(gravity, gm_m3_s2, mesh)
+    if isinstance(gravity, InterpolatedGravity):
+        return _interpolated(gm_m3_s2, mesh)
     return polyhedron_field(mesh.vertices, mesh.faces, gm_m3_s2)
+
+
+def _interpolated(gm_m3_s2: float, mesh: Mesh) -> GravityField:
+    try:
+        return scaled_field(kept_interpolation(mesh.vertices, mesh.faces), gm_m3_s2)
+    except InputRefused as error:
+        raise KeyRefused(("body", "gravity", "model"), error.what, error.fix) from error
 
 
 def _harmonics(gravity: HarmonicsGravity, gm_m3_s2: float, mesh: Mesh) -> GravityField:

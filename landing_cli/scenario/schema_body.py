@@ -10,7 +10,7 @@ from pydantic import Field
 from landing_cli.scenario.schema_base import Number3, Section, exactly_one, wrong
 
 SECONDS_PER_HOUR = 3600.0
-MODELS = "point_mass | harmonics | dipole | polyhedron"
+MODELS = "point_mass | harmonics | dipole | polyhedron | interpolated"
 TWO_PI = 6.283185307179586
 
 
@@ -74,8 +74,15 @@ class PolyhedronGravity(Gravity):
     model: Literal["polyhedron"] = Field(description=MODELS)
 
 
+class InterpolatedGravity(Gravity):
+    """A field fitted to the uniform polyhedron: nearly as exact, and fast enough to solve in."""
+
+    model: Literal["interpolated"] = Field(description=MODELS)
+
+
 AnyGravity = Annotated[
-    PointMassGravity | HarmonicsGravity | DipoleGravity | PolyhedronGravity, Field(discriminator="model")
+    PointMassGravity | HarmonicsGravity | DipoleGravity | PolyhedronGravity | InterpolatedGravity,
+    Field(discriminator="model"),
 ]
 
 

@@ -6,12 +6,21 @@ J at tau = 1. The control is free, so arcs along the ellipsoid are found where t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from problem import Problem, arc_positions, descent_function, final_stage_function, symbols
+from problem import (
+    CORRECTION,
+    THRUST_SAMPLES,
+    Problem,
+    arc_positions,
+    descent_function,
+    final_stage_function,
+    symbols,
+)
 
 CONVERGED = 2e-4  # relative change of tau or J by doubling the intervals
 DOUBLINGS = 3
@@ -57,7 +66,9 @@ def program(
     f, final = descent_function(kind), final_stage_function(kind)
     k, h = 2 * n + 1, 1.0 / n
     X, U, tau = ca.SX.sym("X", 7, k), ca.SX.sym("U", 3, k), ca.SX.sym("tau")
-    rates = [f(X[:, i], U[:, i], p) for i in range(k)]
+    free, places = kind != "polyhedron", k + THRUST_SAMPLES
+    C = ca.SX.zeros(CORRECTION, places) if free else ca.SX.sym("C", CORRECTION, places)
+    rates = [f(X[:, i], U[:, i], p, C[:, i]) for i in range(k)]
     defects, j1 = [], 0
     for i in range(0, k - 1, 2):
         a, m, b = rates[i], rates[i + 1], rates[i + 2]
@@ -65,7 +76,7 @@ def program(
         defects.append(X[:, i + 1] - (X[:, i] + X[:, i + 2]) / 2 - h / 8 * (a - b))
         squares = [ca.dot(U[:, i + c], U[:, i + c]) for c in range(3)]
         j1 += h / 12 * (squares[0] + 4 * squares[1] + squares[2])
-    ratios, cone, j2 = final(X[:, -1], p)
+    ratios, cone, j2 = final(X[:, -1], p, C[:, k:])
     thrust = [ca.dot(U[:, i], U[:, i]) - tau**2 for i in range(k)]
     thrust += [ca.dot(ratios[:, i], ratios[:, i]) - tau**2 for i in range(ratios.shape[1])]
     ellipsoid = [ca.sumsqr(X[:3, i] / part["semi_axes"]) - 1 for i in range(1, k)]
@@ -86,11 +97,11 @@ def program(
         at += block.shape[0]
     nlp = {
         "x": ca.vertcat(ca.vec(X), ca.vec(U), tau),
-        "p": p,
+        "p": p if free else ca.vertcat(p, ca.vec(C)),
         "f": part["weight_tau"] * tau + part["weight_j"] * j,
         "g": ca.vertcat(*blocks.values()),
     }
-    measure = ca.Function("measure", [nlp["x"], p], [j])
+    measure = ca.Function("measure", [nlp["x"], nlp["p"]], [j])
     return ca.nlpsol("hs", "ipopt", nlp, IPOPT), {"rows": rows, "count": at, "j": measure}
 
 
@@ -101,8 +112,16 @@ def _outside(boulder: tuple[float, ...] | None, points: list[ca.SX]) -> ca.SX:
     return ca.vertcat(*[ca.sumsqr(p - ca.DM(boulder[:3])) - boulder[3] ** 2 for p in points])
 
 
-def solve(problem: Problem, n: int, mode: str, x: np.ndarray, u: np.ndarray, tau: float) -> Local:
-    """One local solve in mode ``tau`` or ``j`` from the given start."""
+def solve(
+    problem: Problem,
+    n: int,
+    mode: str,
+    x: np.ndarray,
+    u: np.ndarray,
+    tau: float,
+    correction: np.ndarray | None = None,
+) -> Local:
+    """One local solve in mode ``tau`` or ``j`` from the given start; the correction is that of `uniform`."""
     solver, info = program(problem.gravity[0], n, problem.scaled_boulder)
     k, rows = 2 * n + 1, info["rows"]
     lower, upper = np.zeros(info["count"]), np.zeros(info["count"])
@@ -118,6 +137,9 @@ def solve(problem: Problem, n: int, mode: str, x: np.ndarray, u: np.ndarray, tau
     low[6 : 7 * k : 7], high[6 : 7 * k : 7] = 0.2, 1.0 + 1e-9
     low[-1], high[-1] = (0.0, np.inf) if mode == "tau" else (1.0, 1.0)
     p = problem.parameters(*((1.0, RHO) if mode == "tau" else (0.0, 1.0)))
+    if problem.gravity[0] == "polyhedron":
+        none = np.zeros((k + THRUST_SAMPLES, CORRECTION))
+        p = np.concatenate([p, (none if correction is None else correction).ravel()])
     guess = np.concatenate([x.ravel(), u.ravel(), [tau if mode == "tau" else 1.0]])
     out = solver(x0=guess, p=p, lbx=low, ubx=high, lbg=lower, ubg=upper)
     z, g = np.array(out["x"]).ravel(), np.array(out["g"]).ravel()
@@ -203,10 +225,24 @@ class Answer:
     half: Local | None
     best: Local | None
     statuses: str  # one letter a start: value reached (=best b, worse w), or failed f
+    gravity_error: float = 0.0  # left along the best path, of T_max / m0
 
 
 def _value(path: Local, mode: str) -> float:
     return path.tau if mode == "tau" else path.j
+
+
+def _as_it_is(_intervals: int, path: Local) -> tuple[Local, float]:
+    return path, 0.0
+
+
+def _worth_correcting(paths: dict[str, Local], mode: str) -> list[str]:
+    """Starts whose paths are among the best three that differ, under the gravity that is corrected."""
+    chosen: list[str] = []
+    for name in sorted((n for n, p in paths.items() if p.solved), key=lambda n: _value(paths[n], mode)):
+        if all(_value(paths[name], mode) > _value(paths[c], mode) * (1 + 1e-4) for c in chosen):
+            chosen.append(name)
+    return chosen[:3]
 
 
 def best_over_starts(
@@ -222,18 +258,31 @@ def best_over_starts(
     if names is not None:
         guesses = {k: v for k, v in guesses.items() if k in names or k in (extra or {})}
     paths = {name: solve(problem, n, mode, x, u, 1.2) for name, (x, u) in guesses.items()}
-    good = [p for p in paths.values() if p.solved]
+    finish: Callable[[int, Local], tuple[Local, float]] = _as_it_is
+    if problem.gravity[0] == "polyhedron":
+        from uniform import corrected
+
+        def finish(intervals: int, path: Local) -> tuple[Local, float]:
+            return corrected(problem, intervals, mode, path)
+
+        before = dict(paths)
+        paths |= {name: finish(n, paths[name])[0] for name in _worth_correcting(paths, mode)}
+        good = [paths[name] for name in _worth_correcting(before, mode) if paths[name].solved]
+    else:
+        good = [p for p in paths.values() if p.solved]
     if not good:
         return Answer(None, None, "f" * len(paths))
     coarse = min(good, key=lambda p: _value(p, mode))
     limit = _value(coarse, mode) * (1 + 1e-4)
     letters = ["f" if not p.solved else "b" if _value(p, mode) <= limit else "w" for p in paths.values()]
-    levels = [coarse]
+    levels, left = [coarse], np.nan
     for k in range(1, DOUBLINGS + 1):
         finer = solve(problem, n * 2**k, mode, *refine(levels[-1], n * 2**k), levels[-1].tau)
+        finer, error = finish(n * 2**k, finer)
         if not finer.solved:
             break
         levels.append(finer)
+        left = error
         if abs(_value(levels[-2], mode) / _value(finer, mode) - 1) < CONVERGED:
             break
-    return Answer(levels[-2] if len(levels) > 1 else coarse, levels[-1], "".join(letters))
+    return Answer(levels[-2] if len(levels) > 1 else coarse, levels[-1], "".join(letters), left)

@@ -20,6 +20,7 @@ from problem import Problem
 from reflight import refly
 from scipy.interpolate import RBFInterpolator
 from shape import Shape, degree_two, least_ellipsoid, read_obj
+from uniform import corrected, shape_sha256
 
 HERE = Path(__file__).resolve().parent
 SHAPES = HERE.parent.parent / "shapes"
@@ -74,12 +75,27 @@ def eros(tof: float, **reading: str) -> Case:
     return Case(f"eros_north_pole_{tof:.0f}s", problem, shape)
 
 
+def eros_polyhedron(tof: float, name: str, r0: tuple[float, float, float]) -> Case:
+    """Under the uniform polyhedron of the shape; the dipole is where its solution begins."""
+    shape = read_obj(SHAPES / "eros.obj")
+    semi = tuple(np.ceil(least_ellipsoid(shape) * 1e1) / 1e1)
+    gravity = ("polyhedron", 4.4628e5, 0.528, 15364.0, "eros.obj", shape_sha256("eros.obj"))
+    reading = {"final_mass": "flown"}
+    problem = Problem(
+        r0, (0.0, 0.0, 0.0), 3.3117e-4, gravity, 1000.0, 60.0, 310.0, tof, 300.0, semi, np.pi / 3, **reading
+    )
+    return Case(f"eros_{name}_{tof:.0f}s", problem, shape)
+
+
 def survey_tau(case: Case, facet: int, rng: np.random.Generator) -> float:
     """A quick tau, for choosing facets only."""
     problem = case.problem.at(case.shape.centroids[facet], case.shape.normals[facet])
     found = starts(problem, SURVEY_INTERVALS, rng)
-    taus = [solve(problem, SURVEY_INTERVALS, "tau", *found[name], 1.2) for name in SURVEY_STARTS]
-    return min((t.tau for t in taus if t.solved), default=np.nan)
+    paths = [solve(problem, SURVEY_INTERVALS, "tau", *found[name], 1.2) for name in SURVEY_STARTS]
+    best = min((p for p in paths if p.solved), key=lambda p: p.tau, default=None)
+    if best is not None and problem.gravity[0] == "polyhedron":
+        best = corrected(problem, SURVEY_INTERVALS, "tau", best)[0]
+    return best.tau if best is not None and best.solved else np.nan
 
 
 def predict(case: Case, known: dict[int, float]) -> np.ndarray:
@@ -156,6 +172,12 @@ def tables() -> dict[str, Callable[[], list[tuple[Case, Chooser]]]]:
             (bacchus(1000.0, "equator", (1000.0, 0.0, 0.0)), near_boundary(20, 0, survey=60)),
             (bacchus(900.0, "mid_latitude", (400.0, 0.0, 600.0)), near_boundary(20, 0, survey=60)),
         ],
+        "eros_boundary": lambda: [
+            (eros_polyhedron(1500.0, "north_pole", (0.0, 0.0, 11000.0)), near_boundary(30, 0, survey=60))
+        ],
+        "eros_boundary_broadside": lambda: [
+            (eros_polyhedron(1500.0, "broadside", (0.0, -14000.0, 0.0)), near_boundary(30, 0, survey=40))
+        ],
         "eros": lambda: [(eros(2500.0), near_boundary(16, 8))],
         "eros_flown_mass": lambda: [(eros(2500.0, final_mass="flown"), near_boundary(16, 8))],
     }
@@ -165,6 +187,7 @@ COLUMNS = [
     "case", "facet", "r_c_x_m", "r_c_y_m", "r_c_z_m", "n_x", "n_y", "n_z", "tau", "tau_half", "tau_radau",
     "tau_starts", "tau_ellipsoid_binds", "j_m2_s3", "j_half", "j_radau", "j_starts", "j_ellipsoid_binds",
     "j_ellipsoid_margin", "j_peak_ratio", "reflight_position_m", "reflight_velocity_m_s",
+    "gravity_error",
 ]  # fmt: skip
 
 
@@ -181,14 +204,16 @@ def row_of(case: Case, facet: int, rng: np.random.Generator) -> dict[str, object
         return row
     row |= {"tau": f"{least.best.tau:.7f}", "tau_half": f"{least.half.tau:.7f}"}
     row["tau_ellipsoid_binds"] = int(least.best.ellipsoid_force > BINDS)
-    row["tau_radau"] = checked(radau.solve(problem, INTERVALS, "tau", least.best), 1)
+    polyhedron = problem.gravity[0] == "polyhedron"  # the second method has no corrections
+    row["tau_radau"] = "" if polyhedron else checked(radau.solve(problem, INTERVALS, "tau", least.best), 1)
+    row["gravity_error"] = f"{least.gravity_error:.1e}"
     flown = refly(problem, least.best)
     if least.best.tau < 1:
         best = least_energy(problem, least.best, rng)
         row["j_starts"] = best.statuses
         if best.best is not None:
             row |= {"j_m2_s3": f"{best.best.j:.9e}", "j_half": f"{best.half.j:.9e}"}
-            row["j_radau"] = checked(radau.solve(problem, INTERVALS, "j", best.best), 2)
+            row["j_radau"] = "" if polyhedron else checked(radau.solve(problem, INTERVALS, "j", best.best), 2)
             row["j_ellipsoid_binds"] = int(best.best.ellipsoid_force > BINDS)
             row["j_ellipsoid_margin"] = f"{best.best.margin:.3e}"
             row["j_peak_ratio"] = f"{np.linalg.norm(best.best.u, axis=1).max():.5f}"
@@ -219,18 +244,19 @@ def header(case: Case) -> str:
 
 
 def make(name: str) -> None:
-    """Write one table, anew after each case."""
+    """Write one table, anew after each facet."""
     cases = tables()[name]()
     rng = np.random.default_rng(20221012)
     rows = []
     for case, chooser in cases:
         begun = time.process_time()
         facets = sorted(set(chooser(case, rng)))
-        rows += [row_of(case, facet, rng) for facet in facets]
+        for facet in facets:
+            rows.append(row_of(case, facet, rng))
+            write(name, cases, rows)
         print(
             f"{name} {case.name}: {len(facets)} facets, {time.process_time() - begun:.0f} s CPU", flush=True
         )
-        write(name, cases, rows)
 
 
 def write(name: str, cases: list[tuple[Case, Chooser]], rows: list[dict[str, object]]) -> None:

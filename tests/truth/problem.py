@@ -15,6 +15,8 @@ import casadi as ca
 import numpy as np
 
 STANDARD_GRAVITY = 9.80665
+THRUST_SAMPLES = 33
+CORRECTION = 15  # numbers of a correction of gravity: at a place, its slopes there, the place; see uniform.py
 
 # Parameters of the scaled problem, in the order of the parameter vector.
 PARAMETERS = {
@@ -29,7 +31,8 @@ class Problem:
     """Every physical input of one facet's problem, SI, rotating body frame.
 
     ``gravity`` is ``("harmonics", gm, reference_radius, c20, c22, s22)`` (unnormalised, about the centre
-    of mass), ``("dipole", gm, mass_fraction, separation)`` (the fraction lies on +x) or ``("point", gm)``.
+    of mass), ``("dipole", gm, mass_fraction, separation)`` (the fraction lies on +x), ``("point", gm)``, or
+    ``("polyhedron", gm, mass_fraction, separation, shape, sha256)``: a dipole that is corrected.
     """
 
     r0: tuple[float, float, float]
@@ -78,7 +81,7 @@ class Problem:
         kind, rest = self.gravity[0], self.gravity[2:]
         if kind == "harmonics":
             gravity = [gm, rest[0] / L, *rest[1:]]
-        elif kind == "dipole":
+        elif kind in ("dipole", "polyhedron"):
             gravity = [gm, rest[0], rest[1] / L, 0.0, 0.0]
         else:
             gravity = [gm, 0.0, 0.0, 0.0, 0.0]
@@ -122,14 +125,16 @@ def gravity_function(kind: str, gravity: Any) -> Any:
         radius, c20, c22, s22 = gravity[1], gravity[2], gravity[3], gravity[4]
         degree2 = c20 * (3 * z**2 - d**2) / 2 + 3 * c22 * (x**2 - y**2) + 6 * s22 * x * y
         potential = gm / d + gm * radius**2 / d**5 * degree2
-    elif kind == "dipole":
+    elif kind in ("dipole", "polyhedron"):
         fraction, separation = gravity[1], gravity[2]
         plus = ca.sqrt((x - (1 - fraction) * separation) ** 2 + y**2 + z**2)
         minus = ca.sqrt((x + fraction * separation) ** 2 + y**2 + z**2)
         potential = gm * (fraction / plus + (1 - fraction) / minus)
     else:
         potential = gm / d
-    return ca.Function("g", [r, gravity], [ca.gradient(potential, r)])
+    c = ca.SX.sym("c", CORRECTION)
+    correction = c[:3] + ca.reshape(c[3:12], 3, 3).T @ (r - c[12:])
+    return ca.Function("g", [r, gravity, c], [ca.gradient(potential, r) + correction])
 
 
 def frame_acceleration(omega: Any, r: Any, v: Any) -> Any:
@@ -146,16 +151,16 @@ def arc_positions(x: Any, part: dict[str, Any], samples: int) -> list[Any]:
 
 
 def descent_function(kind: str) -> Any:
-    """State rate f(x, u, p) of the descent stage; x = (r, v, m), u = thrust / T_max."""
+    """State rate f(x, u, p, c) of the descent; x = (r, v, m), u = thrust / T_max, c corrects gravity."""
     p, part = symbols()
-    x, u = ca.SX.sym("x", 7), ca.SX.sym("u", 3)
-    g = gravity_function(kind, part["gravity"])(x[:3], part["gravity"])
+    x, u, c = ca.SX.sym("x", 7), ca.SX.sym("u", 3), ca.SX.sym("c", CORRECTION)
+    g = gravity_function(kind, part["gravity"])(x[:3], part["gravity"], c)
     acceleration = g - frame_acceleration(part["omega"], x[:3], x[3:6]) + part["a_max"] * u / x[6]
     flow = part["a_max"] / part["v_exhaust"] * ca.sqrt(ca.dot(u, u) + 1e-16)
-    return ca.Function("f", [x, u, p], [ca.vertcat(x[3:6], acceleration, -flow)])
+    return ca.Function("f", [x, u, p, c], [ca.vertcat(x[3:6], acceleration, -flow)])
 
 
-def final_stage_function(kind: str, samples: int = 33) -> Any:
+def final_stage_function(kind: str, samples: int = THRUST_SAMPLES) -> Any:
     """Final stage from the handover state: thrust ratios along the arc, cone margins, J2.
 
     With time-to-go s, r - r_c = s^2 (A + B s): total acceleration 2A + 6Bs, velocity -(2A + 3Bs) s.
@@ -163,16 +168,18 @@ def final_stage_function(kind: str, samples: int = 33) -> Any:
     errs by the square of the fall) is spent. The cone margin is taken at both ends of the arc.
     """
     p, part = symbols()
-    x = ca.SX.sym("x", 7)
+    x, c = ca.SX.sym("x", 7), ca.SX.sym("c", CORRECTION, samples)
     T = part["t_final"]
     d, v = x[:3] - part["r_c"], x[3:6]
     A, B = 3 * d / T**2 + v / T, -2 * d / T**3 - v / T**2
     gravity = gravity_function(kind, part["gravity"])
     ratios = []
-    for s in np.linspace(0.0, 1.0, samples):
+    for i, s in enumerate(np.linspace(0.0, 1.0, samples)):
         s = s * T
         position, velocity = part["r_c"] + s**2 * (A + B * s), -s * (2 * A + 3 * B * s)
-        natural = gravity(position, part["gravity"]) - frame_acceleration(part["omega"], position, velocity)
+        natural = gravity(position, part["gravity"], c[:, i]) - frame_acceleration(
+            part["omega"], position, velocity
+        )
         ratios.append(x[6] / part["a_max"] * (2 * A + 6 * B * s - part["compensate"] * natural))
     sizes = [ca.sqrt(ca.dot(f, f) + 1e-12) for f in ratios]
     used, per_step = 0.0, T / (samples - 1) * part["a_max"] / part["v_exhaust"] / x[6]
@@ -186,4 +193,4 @@ def final_stage_function(kind: str, samples: int = 33) -> Any:
         cone.append(ca.dot(part["normal"], along) - part["cos_theta"] * size)
     j2 = 0.5 * (4 * ca.dot(A, A) * T + 12 * ca.dot(A, B) * T**2 + 12 * ca.dot(B, B) * T**3)
     j2 = j2 / (part["a_max"] ** 2 * (1 + T))
-    return ca.Function("final", [x, p], [ca.horzcat(*ratios), ca.vertcat(*cone), j2])
+    return ca.Function("final", [x, p, c], [ca.horzcat(*ratios), ca.vertcat(*cone), j2])

@@ -41,9 +41,9 @@ def program(kind: str, n: int) -> tuple[ca.Function, dict[str, object]]:
         slopes = block @ ca.DM(D)
         for c in range(DEGREE):
             u = U[:, DEGREE * i + c]
-            dynamics.append(slopes[:, c] - h * f(block[:, c + 1], u, p))
+            dynamics.append(slopes[:, c] - h * f(block[:, c + 1], u, p, 0))
             j1 += h * weights[c] * ca.dot(u, u) / 2
-    ratios, cone, j2 = final(X[:, -1], p)
+    ratios, cone, j2 = final(X[:, -1], p, 0)
     thrust = [ca.sumsqr(U[:, i]) - tau**2 for i in range(k - 1)]
     thrust += [ca.sumsqr(ratios[:, i]) - tau**2 for i in range(ratios.shape[1])]
     ellipsoid = [ca.sumsqr(X[:3, i] / part["semi_axes"]) - 1 for i in range(1, k)]

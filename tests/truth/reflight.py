@@ -11,6 +11,10 @@ from scipy.integrate import solve_ivp
 def gravity(problem: Problem, r: np.ndarray) -> np.ndarray:
     """Acceleration of gravity, closed form (not a derivative of the potential)."""
     kind, gm, *rest = problem.gravity
+    if kind == "polyhedron":
+        from uniform import pull
+
+        return pull(problem, r)[0][0]
     d = np.linalg.norm(r)
     if kind == "dipole":
         fraction, separation = rest
@@ -36,6 +40,10 @@ def refly(problem: Problem, path: Local) -> dict[str, float]:
     """Defects at handover, and the limits between the nodes (thrust over tau, ellipsoid margin)."""
     n, T = (len(path.x) - 1) // 2, problem.time
     h, w = T / n, np.array([0.0, 0.0, problem.omega])
+    # a polyhedron takes milliseconds a point: its flights are checked to millimetres only
+    precision = (
+        {"rtol": 1e-8, "atol": 1e-6} if problem.gravity[0] == "polyhedron" else {"rtol": 1e-11, "atol": 1e-9}
+    )
     y = np.concatenate([problem.r0, problem.v0, [problem.mass]])
     semi, peak, margin = np.array(problem.semi_axes), 0.0, np.inf
 
@@ -52,7 +60,7 @@ def refly(problem: Problem, path: Local) -> dict[str, float]:
             flow = np.linalg.norm(force) / (problem.isp * STANDARD_GRAVITY)
             return np.concatenate([v, natural + force / y[6], [-flow]])
 
-        leg = solve_ivp(rate, (0, h), y, method="DOP853", rtol=1e-11, atol=1e-9, dense_output=True)
+        leg = solve_ivp(rate, (0, h), y, method="DOP853", **precision, dense_output=True)
         y = leg.y[:, -1]
         for s in np.linspace(0.1, 1, 10):
             peak = max(peak, float(np.linalg.norm(thrust(i, s))) / problem.thrust)

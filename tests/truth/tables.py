@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,16 @@ from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.dipole import dipole_field
 from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.harmonics import harmonics_field
+from landing_cli.body.gravity.scaled_field import scaled_field
+from landing_cli.body.mass_properties import centred
 from landing_cli.body.mesh import Mesh
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.reach.records import LandingCase
+from landing_cli.sources.kept_interpolation import kept_interpolation
+from landing_cli.sources.shape_files import read_shape
 
 HERE = Path(__file__).resolve().parent
+SHAPES = HERE.parent.parent / "shapes"
 DEPTH_M = 10.0
 
 
@@ -110,9 +116,21 @@ def landing_case(truth: TruthCase) -> tuple[LandingCase, np.ndarray]:
 
 
 def gravity_field(gravity: list[Any]) -> GravityField:
-    """The package's field for a header's gravity."""
+    """The package's field for a header's gravity; for a polyhedron the interpolated one."""
     kind, *numbers = gravity
+    if kind == "polyhedron":
+        return interpolated(numbers[0], *numbers[-2:])
     return {"harmonics": harmonics_field, "dipole": dipole_field}[kind](*numbers)
+
+
+@lru_cache(maxsize=1)
+def interpolated(gm_m3_s2: float, name: str, sha256: str) -> GravityField:
+    """The field fitted to a shipped shape's polyhedron; the table holds for one version of the shape."""
+    shape = read_shape(SHAPES / name, "km")
+    if shape.sha256 != sha256:
+        raise ValueError(f"{name} has changed: make the tables anew that hold its polyhedron")
+    mesh = centred(shape.mesh)
+    return scaled_field(kept_interpolation(mesh.vertices, mesh.faces), gm_m3_s2)
 
 
 def tetrahedra(centroids: np.ndarray, normals: np.ndarray) -> tuple[Mesh, np.ndarray]:

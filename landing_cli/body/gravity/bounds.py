@@ -18,14 +18,19 @@ from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.kernel_types import FloatArray, Vector
 from landing_cli.body.gravity.kernels import acceleration_and_gradient, curvature
 from landing_cli.body.gravity.polyhedron_records import recorded_corners
+from landing_cli.body.gravity.surrounding_kernels import ERROR
 from landing_cli.errors import InputRefused
 from landing_cli.kernel import kernel, part
 
 TOLERANCE = 0.005  # how far a bound may lie above the largest value met
+FIT_MARGIN = 20.0  # a fitted field's error where it was not measured, over the largest that was, twice
 _SECOND_ORDER_MARGIN = 2.0  # covers the change of the second derivative within a patch
 _MOST_PATCHES = 200_000
 _LEAST_ANGLE = 1e-5
 _ROUNDING = 1e-12
+_TURN = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]) @ np.array(
+    [[1.0, 0.0, 0.0], [0.0, 12 / 13, -5 / 13], [0.0, 5 / 13, 12 / 13]]
+)
 
 
 def largest_acceleration_outside(
@@ -61,7 +66,19 @@ def largest_acceleration_outside(
         checked_number("radius", radius, above=0.0)
     semi_axes = None if semi_axes_m is None else _checked_semi_axes(semi_axes_m)
     _refuse_masses_outside(field, float(radii.min(initial=math.inf)), semi_axes)
-    return np.array([_bound_outside(field, float(radius), semi_axes) for radius in radii])
+    bounds = np.array([_bound_outside(field, float(radius), semi_axes) for radius in radii])
+    return bounds * room_for_fit(field)
+
+
+def room_for_fit(field: GravityField) -> float:
+    """Return by what a bound is multiplied for the error of a fitted field, 1 for all others.
+
+    The field that was fitted is that of masses inside, and what is met of it is met within the fit's error;
+    flights may meet the fit where it lies above. FIT_MARGIN times the largest error measured allows for both.
+    """
+    if field.kind is not GravityKind.INTERPOLATED:
+        return 1.0
+    return 1.0 + FIT_MARGIN * float(field.params[ERROR])
 
 
 def _bound_outside(field: GravityField, radius: float, semi_axes: FloatArray | None) -> float:
@@ -96,7 +113,7 @@ def largest_acceleration_on_ellipsoid(field: GravityField, semi_axes_m: ArrayLik
     """
     semi_axes = _checked_semi_axes(semi_axes_m)
     _refuse_masses_outside(field, 0.0, semi_axes)
-    return _bound_on_surface(field, semi_axes, _Region(0.0, None))[1]
+    return _bound_on_surface(field, semi_axes, _Region(0.0, None))[1] * room_for_fit(field)
 
 
 def _checked_semi_axes(semi_axes_m: ArrayLike) -> FloatArray:
@@ -109,7 +126,7 @@ def _refuse_masses_outside(field: GravityField, radius: float, semi_axes: FloatA
         masses = np.array([[*field.params[1:3], 0.0], [*field.params[4:6], 0.0]])
     elif field.kind == GravityKind.POLYHEDRON:
         masses = recorded_corners(field.params)
-    elif field.kind == GravityKind.INTERPOLATED:
+    elif field.kind in (GravityKind.BOXED, GravityKind.INTERPOLATED):
         masses = recorded_corners(field.params[int(field.params[0]) :])
     inside = np.linalg.norm(masses, axis=1) < radius
     if semi_axes is not None:
@@ -133,6 +150,10 @@ def _bound_on_surface(
     """
     # a writable copy, as the solvers have: the kernels compile once
     triangles, params = _sphere_triangles(), field.params.copy()
+    if field.kind in (GravityKind.POLYHEDRON, GravityKind.INTERPOLATED):
+        # a vertex on the least ellipsoid lies where octants meet or in the middle of one: no patch may have
+        # its centre there, where the second derivative is infinite, however often it is split
+        triangles = triangles @ _TURN
     while True:
         directions, angles = _centres(triangles)
         sizes, ceilings, reaches = np.zeros((3, len(triangles)))

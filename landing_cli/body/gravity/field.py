@@ -19,7 +19,8 @@ class GravityKind(IntEnum):
     HARMONICS = 1
     DIPOLE = 2
     POLYHEDRON = 3
-    INTERPOLATED = 4
+    BOXED = 4
+    INTERPOLATED = 5
 
 
 @dataclass(frozen=True, eq=False)

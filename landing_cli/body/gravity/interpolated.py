@@ -52,7 +52,7 @@ class InterpolatedField:
     Attributes
     ----------
     field : GravityField
-        Of the kind ``INTERPOLATED``.
+        Of the kind ``BOXED``.
     error : float
         Largest error of the acceleration over the acceleration, at points that the fit did not see.
     gradient_error : float
@@ -111,7 +111,7 @@ def interpolated_field(
     center, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
     triangles = (recorded_corners(polyhedron.params) - box.origin_m) @ box.axes.T
     pieces = fit_pieces(body, triangles.reshape(-1, 3, 3), center, half, tolerance, most_halvings)
-    field = GravityField(GravityKind.INTERPOLATED, _packed(polyhedron, box, center, half, pieces))
+    field = GravityField(GravityKind.BOXED, _packed(polyhedron, box, center, half, pieces))
     error, gradient_error, points = _measured(field, body, pieces)
     covered = float((pieces.half.prod(axis=1) / half.prod()).sum())
     return InterpolatedField(field, error, gradient_error, points, len(pieces.center), covered)

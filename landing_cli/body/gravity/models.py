@@ -47,6 +47,12 @@ from landing_cli.body.gravity.polyhedron import (
     polyhedron_curvature,
     polyhedron_potential,
 )
+from landing_cli.body.gravity.surrounding_kernels import (
+    surrounding_acceleration,
+    surrounding_acceleration_and_gradient,
+    surrounding_curvature,
+    surrounding_potential,
+)
 
 # numba's own functions are not typed
 _types: Any = types
@@ -81,11 +87,17 @@ _MODELS: dict[GravityKind, tuple[Any, ...]] = {
         polyhedron_acceleration_and_gradient,
         polyhedron_curvature,
     ),
-    GravityKind.INTERPOLATED: (
+    GravityKind.BOXED: (
         interpolated_potential,
         interpolated_acceleration,
         interpolated_acceleration_and_gradient,
         interpolated_curvature,
+    ),
+    GravityKind.INTERPOLATED: (
+        surrounding_potential,
+        surrounding_acceleration,
+        surrounding_acceleration_and_gradient,
+        surrounding_curvature,
     ),
 }
 

@@ -69,7 +69,7 @@ def _odd_series(t: float, u: float) -> float:
 
 
 @part
-def _edge_log(length: float, r_sum: float) -> float:
+def edge_log(length: float, r_sum: float) -> float:
     """Return ln((r1 + r2 + e)/(r1 + r2 - e)); on the edge itself it stays finite.
 
     Far from the edge the logarithm's argument is near 1 and loses its digits; the series keeps them all.
@@ -82,7 +82,7 @@ def _edge_log(length: float, r_sum: float) -> float:
 
 
 @part
-def _solid_angle(triple: float, dots: float) -> float:
+def solid_angle(triple: float, dots: float) -> float:
     """Return 2 atan2(a.(b x c), abc + a b.c + b a.c + c a.b) (Van Oosterom & Strackee 1983)."""
     if abs(triple) < 0.1 * dots:
         t = triple / dots
@@ -91,7 +91,7 @@ def _solid_angle(triple: float, dots: float) -> float:
 
 
 @part
-def _from_point(params: Params, k: int, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+def from_point(params: Params, k: int, x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """Return corner ``params[k:k + 3]`` relative to the point, and its distance."""
     rx, ry, rz = params[k] - x, params[k + 1] - y, params[k + 2] - z
     return rx, ry, rz, math.sqrt(rx * rx + ry * ry + rz * rz)
@@ -105,19 +105,19 @@ def _facet(
 
     The height is that of the facet's plane over the point: positive where the point lies on the inner side.
     """
-    ax, ay, az, a = _from_point(params, k, x, y, z)
-    bx, by, bz, b = _from_point(params, k + 3, x, y, z)
-    cx, cy, cz, c = _from_point(params, k + 6, x, y, z)
+    ax, ay, az, a = from_point(params, k, x, y, z)
+    bx, by, bz, b = from_point(params, k + 3, x, y, z)
+    cx, cy, cz, c = from_point(params, k + 6, x, y, z)
     height = ax * params[k + 9] + ay * params[k + 10] + az * params[k + 11]
     bc, ac, ab = bx * cx + by * cy + bz * cz, ax * cx + ay * cy + az * cz, ax * bx + ay * by + az * bz
-    angle = _solid_angle(height * params[k + 12], a * b * c + a * bc + b * ac + c * ab)
+    angle = solid_angle(height * params[k + 12], a * b * c + a * bc + b * ac + c * ab)
     return ax, ay, az, a, bx, by, bz, b, c, height, angle
 
 
 @part
 def _edge_pull(params: Params, k: int, r_sum: float, rx: float, ry: float, rz: float) -> Vector:
     """Return E.r L of the edge at ``k``."""
-    log = _edge_log(params[k], r_sum)
+    log = edge_log(params[k], r_sum)
     return (
         log * (params[k + 1] * rx + params[k + 4] * ry + params[k + 5] * rz),
         log * (params[k + 4] * rx + params[k + 2] * ry + params[k + 6] * rz),
@@ -190,7 +190,7 @@ def polyhedron_acceleration_and_gradient(params: Params, x: float, y: float, z: 
         ax, ay, az, a, bx, by, bz, b, c, height, angle = _facet(params, k, x, y, z)
         nx, ny, nz = params[k + 9], params[k + 10], params[k + 11]
         wx, wy, wz = angle * nx, angle * ny, angle * nz
-        xx, yy, zz, xy, xz, yz = _edge_tensor(params, k + _FACET, _edge_log(params[k + _FACET], a + b))
+        xx, yy, zz, xy, xz, yz = _edge_tensor(params, k + _FACET, edge_log(params[k + _FACET], a + b))
         gx += height * wx - (xx * ax + xy * ay + xz * az)
         gy += height * wy - (xy * ax + yy * ay + yz * az)
         gz += height * wz - (xz * ax + yz * ay + zz * az)
@@ -202,7 +202,7 @@ def polyhedron_acceleration_and_gradient(params: Params, x: float, y: float, z: 
         hyz += yz - wy * nz
         k += _FACET + _EDGE
         if i < twos:
-            xx, yy, zz, xy, xz, yz = _edge_tensor(params, k, _edge_log(params[k], b + c))
+            xx, yy, zz, xy, xz, yz = _edge_tensor(params, k, edge_log(params[k], b + c))
             gx -= xx * bx + xy * by + xz * bz
             gy -= xy * bx + yy * by + yz * bz
             gz -= xz * bx + yz * by + zz * bz
@@ -218,7 +218,7 @@ def polyhedron_acceleration_and_gradient(params: Params, x: float, y: float, z: 
 
 
 @part
-def _edge_log_slope(length: float, r_sum: float, r_sum_slope: float) -> float:
+def edge_log_slope(length: float, r_sum: float, r_sum_slope: float) -> float:
     """Return the derivative of the edge's logarithm, given that of r1 + r2."""
     return -2.0 * length * r_sum_slope / ((r_sum - length) * (r_sum + length))
 
@@ -236,9 +236,9 @@ def polyhedron_curvature(
     txx = tyy = tzz = txy = txz = tyz = 0.0
     k = _HEADER
     for i in range(facets):
-        ax, ay, az, a = _from_point(params, k, x, y, z)
-        bx, by, bz, b = _from_point(params, k + 3, x, y, z)
-        cx, cy, cz, c = _from_point(params, k + 6, x, y, z)
+        ax, ay, az, a = from_point(params, k, x, y, z)
+        bx, by, bz, b = from_point(params, k + 3, x, y, z)
+        cx, cy, cz, c = from_point(params, k + 6, x, y, z)
         nx, ny, nz, twice_area = params[k + 9], params[k + 10], params[k + 11], params[k + 12]
         bc, ac, ab = bx * cx + by * cy + bz * cz, ax * cx + ay * cy + az * cz, ax * bx + ay * by + az * bz
         triple = (ax * nx + ay * ny + az * nz) * twice_area
@@ -256,7 +256,7 @@ def polyhedron_curvature(
         angle_slope = 2.0 * (dots * triple_slope - triple * dots_slope) / norm
         wx, wy, wz = angle_slope * nx, angle_slope * ny, angle_slope * nz
         e = k + _FACET
-        xx, yy, zz, xy, xz, yz = _edge_tensor(params, e, _edge_log_slope(params[e], a + b, da + db))
+        xx, yy, zz, xy, xz, yz = _edge_tensor(params, e, edge_log_slope(params[e], a + b, da + db))
         txx += xx - wx * nx
         tyy += yy - wy * ny
         tzz += zz - wz * nz
@@ -265,7 +265,7 @@ def polyhedron_curvature(
         tyz += yz - wy * nz
         k += _FACET + _EDGE
         if i < twos:
-            xx, yy, zz, xy, xz, yz = _edge_tensor(params, k, _edge_log_slope(params[k], b + c, db + dc))
+            xx, yy, zz, xy, xz, yz = _edge_tensor(params, k, edge_log_slope(params[k], b + c, db + dc))
             txx += xx
             tyy += yy
             tzz += zz

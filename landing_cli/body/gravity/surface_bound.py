@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from landing_cli.body.gravity.bounds import room_for_fit
 from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.field_values import accelerations, gradients
 from landing_cli.body.gravity.kernel_types import FloatArray
@@ -33,15 +34,15 @@ def largest_acceleration_on_mesh(field: GravityField, mesh: Mesh) -> float:
     float, m/s2
         At most TOLERANCE above the least bound.
     """
-    patches, attained = np.asarray(mesh.corners), 0.0
+    patches, attained, room = np.asarray(mesh.corners), 0.0, room_for_fit(field)
     for _ in range(_MOST_SPLITS):
         sizes, ceilings = _ceilings(field, patches)
         attained = max(attained, float(sizes.max()))
         patches = patches[ceilings > (1.0 + TOLERANCE) * attained]
         if len(patches) == 0:
-            return (1.0 + TOLERANCE) * attained
+            return (1.0 + TOLERANCE) * attained * room
         patches = _split(patches)
-    return max((1.0 + TOLERANCE) * attained, float(_ceilings(field, patches)[1].max()))
+    return room * max((1.0 + TOLERANCE) * attained, float(_ceilings(field, patches)[1].max()))
 
 
 def _ceilings(field: GravityField, patches: FloatArray) -> tuple[FloatArray, FloatArray]:
