@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import signed_distances
+from landing_cli.body.gravity.bounds import room_for_fit
 from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.field_values import accelerations, gradients
 from landing_cli.reach.keep_out_bound import INTERVALS, NODES, PER_NODE, Descent, Facets, Least, applied
@@ -135,6 +136,7 @@ def _gravity_in(descent: Descent, surface: SurfaceIndex, balls: Balls) -> tuple[
     if clear.any():
         gravity[clear] = accelerations(field, centre_m[clear])
         spread[clear] = _largest_change(field, centre_m[clear], radius_m[clear], gravity[clear])
+        spread[clear] += (room_for_fit(field) - 1.0) * np.linalg.norm(gravity[clear], axis=1)
     gravity = applied(turns.transpose(0, 2, 1), gravity) / case.acceleration_m_s2
     return gravity.reshape(balls.centre.shape), (spread / case.acceleration_m_s2).reshape(balls.radius.shape)
 
