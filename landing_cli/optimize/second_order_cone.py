@@ -6,7 +6,8 @@ for interior s and z there is one scaling W with W z = W^-1 s = lambda. With the
 
     W = beta (2 v v' - J),    W^-2 = beta^-2 (2 (J w)(J w)' - J).
 
-Cones are passed as four numbers: they stay in registers and nothing is allocated.
+Cones are passed as four numbers, or as four lanes (`kernel_lanes`): they stay in registers and nothing is
+allocated.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.kernel import kernel
+from landing_cli.kernel_lanes import choose
 
 Floats = NDArray[np.float64]
 
@@ -150,15 +152,9 @@ def longest_step(
     a = d0 * d0 - d1 * d1 - d2 * d2 - d3 * d3
     b = s0 * d0 - s1 * d1 - s2 * d2 - s3 * d3
     c = s0 * s0 - s1 * s1 - s2 * s2 - s3 * s3
-    t = UNBOUNDED
     discriminant = b * b - a * c
-    if discriminant >= 0.0:
-        root = math.sqrt(discriminant)
-        if b <= 0.0:
-            if root - b > 0.0:
-                t = c / (root - b)
-        elif a < 0.0:
-            t = (-b - root) / a
-    if d0 < 0.0:
-        t = min(t, -s0 / d0)
-    return t
+    root = math.sqrt(max(discriminant, 0.0))
+    # the first root t of a t^2 + 2 b t + c, in the form that does not cancel
+    above, below = choose(b <= 0.0, c, b + root), choose(b <= 0.0, root - b, -a)
+    t = choose((discriminant >= 0.0) & (below > 0.0), above / below, UNBOUNDED)
+    return min(t, choose(d0 < 0.0, -s0 / d0, UNBOUNDED))

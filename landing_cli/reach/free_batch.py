@@ -1,4 +1,4 @@
-"""The conic solve over a batch of facets, as one compiled loop.
+"""The conic solve over a batch of facets, as one compiled loop that keeps every lane at work.
 
 Deciding what to solve next (which side of the ellipsoid, which planes, which objective) is left to
 `free_flights`, batch by batch: the big kernel is compiled once and called from one place.
@@ -12,12 +12,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.kernel import kernel
+from landing_cli.kernel_lanes import WIDTH, lane, with_lane
 from landing_cli.kernel_record import by_reference
 from landing_cli.reach.descent_model import Layout, layout
-from landing_cli.reach.free_solve import CERTIFIED, CONVERGED, Solver, solve
+from landing_cli.reach.free_solve import (
+    CERTIFIED,
+    CONVERGED,
+    DEFECT_PERIOD,
+    DUAL,
+    ENERGY,
+    FIRST_DEFECT,
+    GAP,
+    MASS_COSTATE,
+    PRIMAL,
+    LaneSolver,
+    Solver,
+    fill_drift,
+    judge,
+    linearise,
+    take_step,
+)
 from landing_cli.reach.records import Binding
 from landing_cli.reach.scaled_case import ScaledCase
-from landing_cli.reach.shooting import pull_back
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -96,33 +112,21 @@ def no_walls(size: int) -> WallBatch:
 
 
 @kernel
-def keep_costates(case: ScaledCase, plan: Layout, solver: Solver, mass_costate: float, out: Floats) -> None:
-    """Carry the multipliers back to the start and turn them into the rotating frame.
+def keep_costates(
+    case: ScaledCase, plan: Layout, solver: Solver, place: int, mass_costate: float, out: Floats
+) -> None:
+    """Carry the multipliers of a lane back to the start and turn them into the rotating frame.
 
     With v_inertial = v + w x r the costates are lambda_v and lambda_r - w x lambda_v.
     """
-    point, path = solver.point, solver.path
-    m, scratch = point.multiplier, solver.step.node_residual
-    n = path.gradient.shape[0]
+    point, model, path = solver.point, solver.model, solver.path
     p = np.zeros(6)
-    p[0], p[1], p[2], p[3], p[4], p[5] = pull_back(path, n, m[0], m[1], m[2], m[3], m[4], m[5], scratch)
-    for c in range(plan.n_cuts + plan.n_walls):
-        if solver.cuts.node[c] == 0:  # on the final arc
-            continue
-        eta, normal = m[plan.n_equal + c], solver.cuts.normal[c]
-        t = pull_back(
-            path,
-            solver.cuts.node[c],
-            eta * normal[0],
-            eta * normal[1],
-            eta * normal[2],
-            0.0,
-            0.0,
-            0.0,
-            scratch,
-        )
+    for b in range(6):
+        weight = 0.0
+        for r in range(plan.n_rows):
+            weight += lane(point.multiplier[r], place) * lane(model.row_mix[r, b], place)
         for i in range(6):
-            p[i] += t[i]
+            p[i] += weight * lane(path.to_start[b, i], place)
     p[0] += case.spin * p[4]
     p[1] -= case.spin * p[3]
     c, s = case.node_cos[0], case.node_sin[0]
@@ -132,25 +136,110 @@ def keep_costates(case: ScaledCase, plan: Layout, solver: Solver, mass_costate: 
 
 
 @kernel
-def keep_pressure(case: ScaledCase, plan: Layout, solver: Solver, out: Floats) -> None:
+def keep_pressure(
+    case: ScaledCase, plan: Layout, solver: Solver, place: int, planes: int, out: Floats
+) -> None:
     """What a relative loosening of each constraint takes off the objective (envelope theorem)."""
-    point = solver.point
+    point, cuts = solver.point, solver.cuts
     arcs = case.arc_fractions.shape[0]
     out[:] = 0.0
+    tau = lane(point.y[0], place)
     for k in range(point.thrust.shape[0]):
-        out[THRUST] += point.node_dual[k, 0] * point.y[0]
+        out[THRUST] += lane(point.node_dual[k, 0], place) * tau
     for j in range(arcs):
-        out[THRUST] += point.cone_dual[j, 0] * solver.model.cone_map[j, 0, 0] * point.y[0]
+        out[THRUST] += lane(point.cone_dual[j, 0] * solver.model.cone_map[j, 0, 0], place) * tau
     for j in range(arcs, arcs + 2):
-        out[GLIDE_SLOPE] += point.cone_dual[j, 0] * point.cone_slack[j, 0]
-    for r in range(plan.n_equal, plan.n_equal + plan.n_cuts):
-        out[ELLIPSOID] -= point.multiplier[r] * plan.level
-    for c in range(plan.n_cuts, plan.n_cuts + plan.n_walls):
-        out[TERRAIN] -= point.multiplier[plan.n_equal + c] * abs(solver.cuts.offset[c])
+        out[GLIDE_SLOPE] += lane(point.cone_dual[j, 0] * point.cone_slack[j, 0], place)
+    for c in range(planes):
+        kind = ELLIPSOID if lane(cuts.tangent[c], place) > 0.0 else TERRAIN
+        out[kind] -= lane(point.multiplier[plan.first_plane + c], place) * abs(lane(cuts.offset[c], place))
     if case.on_ellipsoid:
-        out[HANDOVER] = abs(point.multiplier[6])
+        out[HANDOVER] = abs(lane(point.multiplier[6], place))
     if case.propellant < 1.0:
-        out[PROPELLANT] = -point.multiplier[plan.n_rows - 1] * case.propellant
+        out[PROPELLANT] = -lane(point.multiplier[plan.first_plane - 1], place) * case.propellant
+
+
+@kernel
+def _load(
+    i: int,
+    place: int,
+    targets: Floats,
+    normals: Floats,
+    cuts: CutBatch,
+    keep_level: Floats,
+    walls: WallBatch,
+    first_plane: int,
+    solver: Solver,
+) -> None:
+    """Put facet i of a batch into a lane: its place, and its planes."""
+    own, live = solver.cuts, solver.model.row_live
+    for a in range(3):
+        solver.target[a] = with_lane(solver.target[a], place, targets[i, a])
+        solver.normal[a] = with_lane(solver.normal[a], place, normals[i, a])
+    count = cuts.planes[i]
+    for c in range(own.node.shape[0]):
+        w = c - count
+        tangent = there = 0.0
+        node = fraction = offset = n0 = n1 = n2 = 0.0
+        if c < count:
+            tangent, there, offset, node = 1.0, 1.0, keep_level[i], float(cuts.node[i, c])
+            n0, n1, n2 = cuts.normal[i, c, 0], cuts.normal[i, c, 1], cuts.normal[i, c, 2]
+        elif w < walls.walls[i]:
+            there, offset, node = 1.0, walls.offset[i, w], float(walls.node[i, w])
+            fraction = walls.fraction[i, w]
+            n0, n1, n2 = walls.normal[i, w, 0], walls.normal[i, w, 1], walls.normal[i, w, 2]
+        own.tangent[c], own.node[c] = (
+            with_lane(own.tangent[c], place, tangent),
+            with_lane(own.node[c], place, node),
+        )
+        own.fraction[c], own.offset[c] = (
+            with_lane(own.fraction[c], place, fraction),
+            with_lane(own.offset[c], place, offset),
+        )
+        n = own.normal[c]
+        n[0], n[1], n[2] = with_lane(n[0], place, n0), with_lane(n[1], place, n1), with_lane(n[2], place, n2)
+        live[first_plane + c] = with_lane(live[first_plane + c], place, there)
+
+
+@kernel
+def _keep(
+    i: int,
+    place: int,
+    case: ScaledCase,
+    plan: Layout,
+    solver: Solver,
+    mass_costate: float,
+    cuts: CutBatch,
+    planes: int,
+    out: Batch,
+) -> None:
+    """Copy the answer in a lane to facet i of a batch."""
+    point, path = solver.point, solver.path
+    out.level[i] = lane(point.y[0], place)
+    for k in range(out.thrust.shape[1]):
+        for a in range(3):
+            out.thrust[i, k, a] = lane(point.thrust[k, a], place)
+    for k in range(out.position.shape[1]):
+        for a in range(3):
+            out.position[i, k, a] = lane(path.position[k, a], place)
+    for c in range(cuts.planes[i]):
+        for a in range(3):
+            cuts.normal[i, c, a] = lane(solver.cuts.normal[c, a], place)
+    if out.status[i] == CONVERGED:
+        keep_costates(case, plan, solver, place, mass_costate, out.costates[i])
+    if out.status[i] == CONVERGED or out.status[i] == CERTIFIED:
+        keep_pressure(case, plan, solver, place, planes, out.pressure[i])
+
+
+@kernel
+def _fill_order(planes: Ints, walls: Ints, most: int, order: Ints) -> None:
+    """Facets with many planes first: lanes with as many rows share less of what the others do not need."""
+    at = np.int64(0)
+    for many in range(most, -1, -1):
+        for i in range(planes.shape[0]):
+            if planes[i] + walls[i] == many:
+                order[at] = i
+                at += 1
 
 
 @kernel
@@ -168,7 +257,7 @@ def solve_many(
     tube: Floats,
     arc_bound: float,
     prove: bool,
-    solver: Solver,
+    solver: LaneSolver,
     out: Batch,
 ) -> None:
     """Solve every facet of a batch from a cold start.
@@ -196,40 +285,57 @@ def solve_many(
     tube, arc_bound : (N,) float, float
         Bounds of gravity for the certificate.
     prove : bool
-        Bound the thrust level of the flights that keep to the planes; see :func:`free_solve.solve`.
+        Bound the thrust level of the flights that keep to the planes; see :func:`free_solve.judge`.
     solver : Solver
         Work space for the case.
     out : Batch
         Filled.
     """
-    for i in range(targets.shape[0]):
-        count = cuts.planes[i]
-        for c in range(count):
-            solver.cuts.node[c] = cuts.node[i, c]
-            for a in range(3):
-                solver.cuts.normal[c, a] = cuts.normal[i, c, a]
-        for w in range(walls.walls[i]):
-            c = count + w
-            solver.cuts.node[c], solver.cuts.fraction[c] = walls.node[i, w], walls.fraction[i, w]
-            solver.cuts.offset[c] = walls.offset[i, w]
-            for a in range(3):
-                solver.cuts.normal[c, a] = walls.normal[i, w, a]
-        plan = layout(case, count, energy_weight, tau_free, keep_level[i], walls.walls[i])
-        outcome = solve(
-            case, targets[i], normals[i], plan, retake_from, tube, arc_bound, limit, prove, solver
-        )
-        out.status[i], out.iterations[i] = outcome.status, outcome.iterations
-        out.energy[i], out.level[i], out.bound[i] = outcome.energy, solver.point.y[0], outcome.bound
-        for k in range(out.thrust.shape[1]):
-            for a in range(3):
-                out.thrust[i, k, a] = solver.point.thrust[k, a]
-        for k in range(out.position.shape[1]):
-            for a in range(3):
-                out.position[i, k, a] = solver.path.position[k, a]
-        for c in range(count):
-            for a in range(3):
-                cuts.normal[i, c, a] = solver.cuts.normal[c, a]
-        if outcome.status == CONVERGED:
-            keep_costates(case, plan, solver, outcome.mass_costate, out.costates[i])
-        if outcome.status == CONVERGED or outcome.status == CERTIFIED:
-            keep_pressure(case, plan, solver, out.pressure[i])
+    lanes, facet, iteration = solver.lanes, solver.facet, solver.iteration
+    n, loaded, marks = targets.shape[0], np.int64(0), lanes.marks
+    order = np.empty(n, dtype=np.int64)
+    _fill_order(cuts.planes, walls.walls, lanes.cuts.node.shape[0], order)
+    first_plane = layout(case, 0, energy_weight, tau_free).first_plane
+    fill_drift(case, lanes)
+    facet[:] = -1
+    while True:
+        marks[0] = marks[1] = marks[2] = 0.0
+        active, planes = False, np.int64(0)
+        for place in range(WIDTH):
+            if facet[place] < 0 and loaded < n:
+                facet[place], iteration[place], solver.bound[place] = order[loaded], 0, 0.0
+                loaded += 1
+                _load(facet[place], place, targets, normals, cuts, keep_level, walls, first_plane, lanes)
+                marks[0] = with_lane(marks[0], place, 1.0)
+            if facet[place] < 0:
+                continue
+            active = True
+            planes = max(planes, cuts.planes[facet[place]] + walls.walls[facet[place]])
+            iteration[place] += 1
+            if iteration[place] > 1 and iteration[place] % DEFECT_PERIOD == FIRST_DEFECT:
+                marks[1] = with_lane(marks[1], place, 1.0)
+            if iteration[place] >= retake_from:
+                marks[2] = with_lane(marks[2], place, 1.0)
+        if not active:
+            break
+        plan = layout(case, planes, energy_weight, tau_free)
+        linearise(case, plan, lanes)
+        numbers, goes_on = lanes.numbers, False
+        for place in range(WIDTH):
+            i = facet[place]
+            if i < 0:
+                continue
+            residual = lane(numbers[PRIMAL], place), lane(numbers[DUAL], place), lane(numbers[GAP], place)
+            outcome = judge(
+                case, plan, place, residual, cuts.planes[i], tube, arc_bound, limit, prove, solver
+            )
+            if outcome.status < 0:
+                goes_on = True
+                continue
+            out.status[i], out.iterations[i], out.bound[i] = outcome.status, iteration[place], outcome.bound
+            out.energy[i] = lane(numbers[ENERGY], place)
+            count = cuts.planes[i] + walls.walls[i]
+            _keep(i, place, case, plan, lanes, lane(numbers[MASS_COSTATE], place), cuts, count, out)
+            facet[place] = -1
+        if goes_on:
+            take_step(plan, lanes)
