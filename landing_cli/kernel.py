@@ -16,3 +16,5 @@ _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrap
 
 kernel = _njit(**_OPTIONS)
 inlined = _njit(**_OPTIONS, inline="always")
+# For kernels that only kernels call: what unboxes large records for Python takes longer than many a kernel.
+inner = _njit(**_OPTIONS, no_cpython_wrapper=True)

@@ -20,11 +20,13 @@ from numpy.typing import NDArray
 
 # numba's own functions are not typed
 _types: Any = types
+_typeconv: Any = typeconv
 _extending: Any = extending
 _cgutils: Any = cgutils
 _Concrete: Any = templates.ConcreteTemplate
 _PrimitiveModel: Any = extending.models.PrimitiveModel
 _signature: Any = templates.signature
+_infer_global: Any = templates.infer_global
 
 WIDTH = 4
 # A product and a sum that takes it may be rounded once, as one operation.
@@ -44,7 +46,7 @@ class _LanesType(types.Type):
 
     def can_convert_from(self, _context: Any, other: Any) -> Any:
         """Tell that plain numbers convert."""
-        return typeconv.Conversion.safe if isinstance(other, types.Float | types.Integer) else None
+        return _typeconv.Conversion.safe if isinstance(other, types.Float | types.Integer) else None
 
     def unify(self, _context: Any, other: Any) -> Any:
         """Unify with plain numbers."""
@@ -111,12 +113,12 @@ def _widen(context: Any, builder: Any, kind: Any, _to: Any, value: Any) -> Any:
 
 def _operation(function: Any, result: Any, build: Any, arguments: int = 2, of: Any = lanes) -> None:
     """Teach numba a function of lanes, mixed with plain numbers too."""
-    kinds = [(of,)] if arguments == 1 else [(of, of)]
+    kinds: list[tuple[Any, ...]] = [(of,) * arguments]
     if arguments == 2 and of is lanes:
         kinds += [(lanes, _real), (_real, lanes)]
 
     cases = [_signature(result, *pair) for pair in kinds]
-    templates.infer_global(function)(type("Lanes", (_Concrete,), {"cases": cases}))
+    _infer_global(function)(type("Lanes", (_Concrete,), {"cases": cases}))
 
     def lower(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         wide = [context.cast(builder, v, t, of) for v, t in zip(values, signature.args, strict=True)]
@@ -263,3 +265,43 @@ def add_at_rows(_context: Any, array: Any, row: Any, column: Any, value: Any) ->
 
     kinds = (lanes, column, lanes) if wide else (_real, column, _real)
     return _types.void(array, *kinds), generate
+
+
+def _lane_copier(reads: bool) -> Any:
+    """Return what copies all numbers of one lane between a LaneArray and a plain array of its shape."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        number = ir.DoubleType().as_pointer()
+        places, sizes = [], []
+        for kind, value in ((signature.args[0], values[0]), (signature.args[2], values[2])):
+            view = context.make_array(kind)(context, builder, value)
+            places.append(builder.bitcast(view.data, number))
+            size = ir.Constant(ir.IntType(64), 1)
+            for extent in _cgutils.unpack_tuple(builder, view.shape, kind.ndim):
+                size = builder.mul(size, extent)
+            sizes.append(size)
+        shorter = builder.select(builder.icmp_signed("<", *sizes), *sizes)
+        with _cgutils.for_range(builder, shorter) as loop:
+            of_lane = builder.add(builder.mul(loop.index, ir.Constant(ir.IntType(64), WIDTH)), values[1])
+            wide, plain = builder.gep(places[0], [of_lane]), builder.gep(places[1], [loop.index])
+            source, target = (wide, plain) if reads else (plain, wide)
+            builder.store(builder.load(source), target)
+        return context.get_dummy_value()
+
+    def copy(_context: Any, array: Any, place: Any, plain: Any) -> Any:
+        fits = array.dtype == lanes and plain.dtype == _real and array.layout == plain.layout == "C"
+        return (_types.void(array, types.int64, plain), generate) if fits else None
+
+    return copy
+
+
+@_extending.intrinsic
+def take_lane(context: Any, array: Any, place: Any, plain: Any) -> Any:
+    """Copy one lane of an array to a plain one, in C order, up to the end of the shorter one."""
+    return _lane_copier(True)(context, array, place, plain)
+
+
+@_extending.intrinsic
+def put_lane(context: Any, array: Any, place: Any, plain: Any) -> Any:
+    """Copy a plain array to one lane of an array, in C order, up to the end of the shorter one."""
+    return _lane_copier(False)(context, array, place, plain)

@@ -11,7 +11,7 @@ from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.optimize.conic_records import Model, Point
 from landing_cli.reach.descent_model import Layout, layout, refresh
-from landing_cli.reach.free_solve import Solver, basis_of, cold_start, fill_drift, new_solver_of
+from landing_cli.reach.free_solve import Solver, basis_of, cold_start, fill_constants, new_solver_of
 from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal, scale_case
 from landing_cli.reach.shooting import fly
@@ -24,7 +24,9 @@ def solver_of(scaled: ScaledCase, plan: Layout, target: np.ndarray, normal: np.n
     """A solver with room for exactly this problem, not yet with its planes."""
     solver = new_solver_of(INTERVALS, plan.n_cones, plan.n_rows, INTERVALS + 1, basis_of(scaled))
     solver.target[:], solver.normal[:], solver.model.row_live[:] = target, normal, 1.0
-    fill_drift(scaled, solver)
+    fly(scaled, solver.point.thrust, solver.path)
+    solver.drift[:3], solver.drift[3:] = solver.path.position[-1], solver.path.velocity[-1]
+    fill_constants(scaled, solver)
     return solver
 
 

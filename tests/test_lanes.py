@@ -23,6 +23,8 @@ from landing_cli.kernel_lanes import (
     choose,
     lane,
     new_lanes,
+    put_lane,
+    take_lane,
     with_lane,
 )
 from landing_cli.kernel_record import by_reference
@@ -59,6 +61,12 @@ def _arithmetic(numbers: Numbers) -> None:
         out[12] = choose(x <= y, 1.0, choose(x > 0.0, y, x))
         row = choose(x > 0.0, 1.0, 2.0)
         add_at_rows(numbers.table, row, 1, at_rows(numbers.table, row, 0) + x)
+
+
+@kernel
+def _copy_lane(numbers: Numbers, place: int, plain: Any) -> None:
+    take_lane(numbers.table, place, plain)
+    put_lane(numbers.out, place, plain)
 
 
 @kernel
@@ -103,6 +111,19 @@ def test_a_lane_is_read_and_written_alone(place: int) -> None:
     changed = x[0].copy()
     changed[place] = 7.0
     np.testing.assert_array_equal(by_lane(numbers.y)[0], changed)
+
+
+@pytest.mark.parametrize("place", range(WIDTH))
+def test_a_lane_is_copied_alone_up_to_the_end_of_the_shorter_array(place: int) -> None:
+    numbers, _, _ = numbers_in_lanes(1)
+    by_lane(numbers.table)[:] = np.arange(6 * WIDTH).reshape(3, 2, WIDTH)
+    by_lane(numbers.out)[:] = -1.0
+    plain = np.full((2, 4), 9.0)
+    _copy_lane(numbers, place, plain)
+    np.testing.assert_array_equal(plain.ravel(), [*by_lane(numbers.table)[..., place].ravel(), 9.0, 9.0])
+    out = by_lane(numbers.out).reshape(-1, WIDTH)
+    np.testing.assert_array_equal(out[:8, place], plain.ravel())
+    assert (out[8:] == -1.0).all() and (np.delete(out, place, axis=1) == -1.0).all()
 
 
 def test_lane_arrays_are_aligned_and_share_memory_with_their_numbers() -> None:

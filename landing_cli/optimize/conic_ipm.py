@@ -28,9 +28,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel import inlined, inner, kernel
 from landing_cli.kernel_lanes import add_at_rows, at_rows, choose
-from landing_cli.optimize.conic_records import Y_SIZE, Model, Point, Step
+from landing_cli.optimize.conic_records import STATE, Y_SIZE, Model, Point, Step
 from landing_cli.optimize.second_order_cone import (
     UNBOUNDED,
     apply_inverse_scaling_squared,
@@ -38,7 +38,7 @@ from landing_cli.optimize.second_order_cone import (
     longest_step,
     scaling_point,
 )
-from landing_cli.optimize.small_dense import cholesky, cholesky_solve
+from landing_cli.optimize.small_dense import cholesky, cholesky_solve, solve_lower, solve_upper
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ FRACTION_TO_BOUNDARY = 0.98
 ROW_REGULARISATION = 1e-9
 
 
-@kernel
+@inner
 def _sum_reaching(model: Model, weight: Floats, n_rows: int) -> None:
     """Fill ``model.sums``: row k + 1 holds the mixes of the rows that reach interval k, by their weights."""
     sums, mix, end = model.sums, model.row_mix, model.row_end
@@ -55,7 +55,9 @@ def _sum_reaching(model: Model, weight: Floats, n_rows: int) -> None:
     for k in range(n + 1):
         for b in range(basis):
             sums[k, b] = 0.0
-    for r in range(n_rows):
+    for r in range(STATE):
+        sums[n, r] = weight[r]
+    for r in range(STATE, n_rows):
         for b in range(basis):
             add_at_rows(sums, end[r], b, weight[r] * mix[r, b])
     for k in range(n - 1, 0, -1):
@@ -77,7 +79,7 @@ def fill_row_pull(point: Point, model: Model, n_rows: int) -> None:
         pull[k, 0], pull[k, 1], pull[k, 2] = p0, p1, p2
 
 
-@kernel
+@inlined
 def residuals(
     point: Point, model: Model, step: Step, n_equal: int, n_rows: int, n_cones: int, tau_free: bool
 ) -> tuple[float, float, float]:
@@ -131,7 +133,7 @@ def residuals(
     return primal, dual, gap
 
 
-@kernel
+@inner
 def _scale_cones(point: Point, model: Model, step: Step, n_cones: int) -> None:
     """Scale the cones on y and start the order-7 system with their Hessians."""
     reduced = step.reduced
@@ -150,7 +152,7 @@ def _scale_cones(point: Point, model: Model, step: Step, n_cones: int) -> None:
                 reduced[a, b] += A[0, a] * g0 + A[1, a] * g1 + A[2, a] * g2 + A[3, a] * g3
 
 
-@kernel
+@inner
 def _eliminate_nodes(point: Point, model: Model, step: Step) -> None:
     """Scale every node's cone and sum up what the basis makes of its inverse Hessian."""
     products, basis = step.products, model.basis
@@ -186,13 +188,19 @@ def _eliminate_nodes(point: Point, model: Model, step: Step) -> None:
                 e += 1
 
 
-@kernel
+@inner
 def _join_rows(model: Model, step: Step, n_rows: int) -> None:
     """Fill the rows' Schur complement and coupling to tau from the sums over the intervals."""
     products, mix, mixed, end = step.products, model.row_mix, step.mixed, model.row_end
-    size = mix.shape[1]
-    first = size * (size + 1) // 2
-    for r in range(n_rows):
+    size, schur = mix.shape[1], step.schur
+    first, whole = size * (size + 1) // 2, products[products.shape[0] - 1]
+    e = 0
+    for r in range(STATE):
+        step.coupling[r, 0] = model.row_y[r, 0] + whole[first + r]
+        for q in range(r + 1):
+            schur[r, q] = whole[e]
+            e += 1
+    for r in range(STATE, n_rows):
         tau, e = model.row_y[r, 0], 0
         for i in range(size):
             mixed[r, i] = 0.0
@@ -206,12 +214,14 @@ def _join_rows(model: Model, step: Step, n_rows: int) -> None:
             mixed[r, i] += at_rows(products, end[r], e) * mix[r, i]
             e += 1
         step.coupling[r, 0] = tau
-        for q in range(r + 1):
+        for q in range(STATE):
+            schur[r, q] = mixed[r, q]
+        for q in range(STATE, r + 1):
             by_r = by_q = 0.0
             for i in range(size):
                 by_r += mixed[r, i] * mix[q, i]
                 by_q += mixed[q, i] * mix[r, i]
-            step.schur[r, q] = choose(end[r] <= end[q], by_r, by_q)
+            schur[r, q] = choose(end[r] <= end[q], by_r, by_q)
 
 
 @inlined
@@ -239,22 +249,23 @@ def factorise(
         for i in range(n_rows):
             coupling[i, 0] = 0.0
     cholesky(schur, n_rows)
-    for a in range(Y_SIZE):
-        for i in range(n_rows):
-            step.rhs_rows[i] = coupling[i, a]
-        cholesky_solve(schur, n_rows, step.rhs_rows)
-        for i in range(n_rows):
-            solved[i, a] = step.rhs_rows[i]
+    for i in range(n_rows):
+        inverse = 1.0 / schur[i, i]
+        for a in range(Y_SIZE):
+            total = coupling[i, a]
+            for k in range(i):
+                total -= schur[i, k] * solved[k, a]
+            solved[i, a] = total * inverse
     for a in range(Y_SIZE):
         for b in range(a + 1):
             total = step.reduced[a, b]
             for i in range(n_rows):
-                total += coupling[i, a] * solved[i, b]
+                total += solved[i, a] * solved[i, b]
             step.reduced[a, b] = total
     cholesky(step.reduced, step.d_y.shape[0])
 
 
-@kernel
+@inner
 def _right_hand_side(
     point: Point,
     model: Model,
@@ -318,7 +329,9 @@ def _right_hand_side(
             sums[k + 1, b] = sums[k, b] + (
                 basis[k, b, 0] * d[0] + basis[k, b, 1] * d[1] + basis[k, b, 2] * d[2]
             )
-    for r in range(n_rows):
+    for r in range(STATE):
+        step.rhs_rows[r] -= sums[sums.shape[0] - 1, r]
+    for r in range(STATE, n_rows):
         total = 0.0
         for b in range(basis.shape[1]):
             total += model.row_mix[r, b] * at_rows(sums, model.row_end[r], b)
@@ -327,24 +340,26 @@ def _right_hand_side(
         step.rhs_y[0] = 0.0
 
 
-@kernel
+@inner
 def _solve_dense(step: Step, n_rows: int) -> None:
     """Solve B dy - M dlambda = rhs_rows and H dy + B' dlambda = rhs_y."""
-    cholesky_solve(step.schur, n_rows, step.rhs_rows)
+    solved = step.solved_coupling
+    solve_lower(step.schur, n_rows, step.rhs_rows)
     for a in range(Y_SIZE):
         total = step.rhs_y[a]
         for i in range(n_rows):
-            total += step.coupling[i, a] * step.rhs_rows[i]
+            total += solved[i, a] * step.rhs_rows[i]
         step.d_y[a] = total
     cholesky_solve(step.reduced, step.d_y.shape[0], step.d_y)
     for i in range(n_rows):
         total = -step.rhs_rows[i]
         for a in range(Y_SIZE):
-            total += step.solved_coupling[i, a] * step.d_y[a]
+            total += solved[i, a] * step.d_y[a]
         step.d_multiplier[i] = total
+    solve_upper(step.schur, n_rows, step.d_multiplier)
 
 
-@kernel
+@inner
 def _recover_cones(point: Point, model: Model, step: Step, n_equal: int, n_rows: int, n_cones: int) -> float:
     """Directions of the cones on y and of the inequality rows; the longest step they allow."""
     longest = UNBOUNDED
@@ -371,7 +386,7 @@ def _recover_cones(point: Point, model: Model, step: Step, n_equal: int, n_rows:
     return longest
 
 
-@kernel
+@inner
 def _recover_nodes(point: Point, model: Model, step: Step, n_rows: int) -> float:
     """Directions of the thrust nodes and their duals; the longest step they allow."""
     longest = UNBOUNDED
@@ -397,7 +412,7 @@ def _recover_nodes(point: Point, model: Model, step: Step, n_rows: int) -> float
     return longest
 
 
-@kernel
+@inlined
 def advance(
     point: Point,
     model: Model,
@@ -420,7 +435,7 @@ def advance(
     for r in range(n_equal, n_rows):
         degree += model.row_live[r]
     factorise(point, model, step, n_equal, n_rows, n_cones, tau_free)
-    target = longest = 0.0
+    target = longest = choose(gap > 0.0, 0.0, 0.0)
     for corrected in (False, True):
         _right_hand_side(point, model, step, n_equal, n_rows, n_cones, target, corrected, tau_free)
         _solve_dense(step, n_rows)

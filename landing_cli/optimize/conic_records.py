@@ -38,7 +38,8 @@ class Model(NamedTuple):
     """The problem linearised at a point.
 
     A row's derivative by the thrust of interval k is a mix of the B basis functionals' up to the row's end,
-    and zero beyond: sum_b row_mix[r, b] basis[k, b] for k < row_end[r].
+    and zero beyond: sum_b row_mix[r, b] basis[k, b] for k < row_end[r]. The first STATE rows are the first
+    STATE functionals, up to the last interval; their mixes are not read.
     """
 
     row_value: Floats  # (R,) c(F, y); for inequality rows before the slack is taken off
@@ -75,7 +76,7 @@ class Step(NamedTuple):
     mixed: Floats  # (R, B) the triangle at each row's end times its mix
     schur: Floats  # (R, R) rows' H^-1 rows' and its factor
     coupling: Floats  # (R, 7)
-    solved_coupling: Floats  # (R, 7) schur^-1 coupling
+    solved_coupling: Floats  # (R, 7) L^-1 coupling, schur = L L'
     reduced: Floats  # (7, 7)
     row_shift: Floats  # (R,) constant part of an inequality row's slack step
     rhs_rows: Floats  # (R,)

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import inlined, inner, kernel
 from landing_cli.kernel_lanes import choose
 from landing_cli.optimize.conic_ipm import fill_row_pull
 from landing_cli.optimize.conic_records import Model, Point
@@ -134,7 +134,7 @@ def fill_glide_cones(case: ScaledCase, normal: Floats, model: Model) -> None:
                     A[i, 1 + c] = wide * frame[i][c]
 
 
-@kernel
+@inner
 def fill_energy(case: ScaledCase, rho: float, model: Model) -> None:
     """Hessian of rho J in y: J2 = T/6 (|a_e|^2 + a_e . a_s + |a_s|^2)."""
     weight = rho * case.final_time / 6.0
@@ -144,7 +144,7 @@ def fill_energy(case: ScaledCase, rho: float, model: Model) -> None:
         model.y_hessian[1 + i, 4 + i] = model.y_hessian[4 + i, 1 + i] = weight
 
 
-@kernel
+@inner
 def handover_point(case: ScaledCase, target: Floats, y: Floats) -> tuple[float, float, float]:
     """Handover position of the final arc, solver axes."""
     _, _, r_e, r_s, _, _ = arc_weights(1.0, case.final_time)
@@ -155,7 +155,7 @@ def handover_point(case: ScaledCase, target: Floats, y: Floats) -> tuple[float, 
     )
 
 
-@kernel
+@inner
 def refresh_arc(case: ScaledCase, target: Floats, handover_mass: float, model: Model, y: Floats) -> float:
     """Gravity and mass along the final arc; returns the mass at touchdown.
 
@@ -192,7 +192,7 @@ def refresh_arc(case: ScaledCase, target: Floats, handover_mass: float, model: M
     return mass
 
 
-@kernel
+@inner
 def _refresh_matching(case: ScaledCase, target: Floats, path: Path, model: Model, y: Floats) -> None:
     """Values and thrust derivatives of the six matching rows."""
     n = path.gradient.shape[0]
@@ -206,7 +206,7 @@ def _refresh_matching(case: ScaledCase, target: Floats, path: Path, model: Model
     pull_back(path, model.basis)
 
 
-@kernel
+@inner
 def _refresh_handover_on_ellipsoid(case: ScaledCase, target: Floats, model: Model, point: Point) -> None:
     """Row 6: the handover on the ellipsoid, |xi(r_p)| = 1, linearised in y.
 
@@ -233,7 +233,7 @@ def _refresh_handover_on_ellipsoid(case: ScaledCase, target: Floats, model: Mode
                     )
 
 
-@kernel
+@inner
 def _refresh_approach(case: ScaledCase, target: Floats, model: Model, y: Floats, r: int) -> None:
     """Row r: an ellipsoid is reached from outside, -n . v_p >= 0, in the rotating frame.
 
@@ -256,7 +256,7 @@ def _refresh_approach(case: ScaledCase, target: Floats, model: Model, y: Floats,
         model.row_value[r] -= normal[i] * (v_e * y[1 + i] + v_s * y[4 + i])
 
 
-@kernel
+@inner
 def _refresh_propellant(
     case: ScaledCase, point: Point, path: Path, model: Model, r: int, touchdown_mass: float
 ) -> None:
@@ -292,7 +292,7 @@ def _refresh_propellant(
             model.row_y[r, a] -= flow * touchdown_mass * case.final_time * width * along
 
 
-@kernel
+@inner
 def _add_mass_gradient(case: ScaledCase, point: Point, path: Path, model: Model) -> float:
     """Gradient through the mass: -c h lambda_m F / |F|, the mass costate carried back from the handover.
 
@@ -316,7 +316,7 @@ def _add_mass_gradient(case: ScaledCase, point: Point, path: Path, model: Model)
     return costate
 
 
-@kernel
+@inlined
 def refresh(
     case: ScaledCase,
     target: Floats,

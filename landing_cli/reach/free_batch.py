@@ -11,23 +11,27 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
-from landing_cli.kernel_lanes import WIDTH, lane, with_lane
+from landing_cli.kernel import inlined, inner, kernel
+from landing_cli.kernel_lanes import WIDTH, lane, put_lane, take_lane, with_lane
 from landing_cli.kernel_record import by_reference
 from landing_cli.reach.descent_model import Layout, layout
 from landing_cli.reach.free_solve import (
+    BEGINNING,
+    BEGINS,
     CERTIFIED,
     CONVERGED,
     DEFECT_PERIOD,
-    DUAL,
     ENERGY,
     FIRST_DEFECT,
-    GAP,
+    HALVED_FROM,
     MASS_COSTATE,
-    PRIMAL,
+    MEASURED,
+    NEW,
+    RETAKEN,
     LaneSolver,
+    Single,
     Solver,
-    fill_drift,
+    hand_over,
     judge,
     linearise,
     take_step,
@@ -111,55 +115,89 @@ def no_walls(size: int) -> WallBatch:
     return WallBatch(np.zeros(size, dtype=np.int64), nodes, numbers, np.zeros((size, 0, 3)), numbers.copy())
 
 
-@kernel
-def keep_costates(
-    case: ScaledCase, plan: Layout, solver: Solver, place: int, mass_costate: float, out: Floats
-) -> None:
-    """Carry the multipliers of a lane back to the start and turn them into the rotating frame.
+@inner
+def keep_costates(case: ScaledCase, plan: Layout, single: Single, out: Floats) -> None:
+    """Carry the multipliers back to the start and turn them into the rotating frame.
 
     With v_inertial = v + w x r the costates are lambda_v and lambda_r - w x lambda_v.
     """
-    point, model, path = solver.point, solver.model, solver.path
+    multiplier, mix = single.point.multiplier, single.model.row_mix
     p = np.zeros(6)
     for b in range(6):
         weight = 0.0
         for r in range(plan.n_rows):
-            weight += lane(point.multiplier[r], place) * lane(model.row_mix[r, b], place)
+            weight += multiplier[r] * mix[r, b]
         for i in range(6):
-            p[i] += weight * lane(path.to_start[b, i], place)
+            p[i] += weight * single.to_start[b, i]
     p[0] += case.spin * p[4]
     p[1] -= case.spin * p[3]
     c, s = case.node_cos[0], case.node_sin[0]
     for i in range(0, 6, 3):
         out[i], out[i + 1], out[i + 2] = c * p[i] + s * p[i + 1], c * p[i + 1] - s * p[i], p[i + 2]
-    out[6] = mass_costate
+    out[6] = single.numbers[MASS_COSTATE]
 
 
-@kernel
+@inner
 def keep_pressure(
-    case: ScaledCase, plan: Layout, solver: Solver, place: int, planes: int, out: Floats
+    case: ScaledCase, plan: Layout, single: Single, intervals: int, planes: int, out: Floats
 ) -> None:
     """What a relative loosening of each constraint takes off the objective (envelope theorem)."""
-    point, cuts = solver.point, solver.cuts
+    point, cuts = single.point, single.cuts
     arcs = case.arc_fractions.shape[0]
     out[:] = 0.0
-    tau = lane(point.y[0], place)
-    for k in range(point.thrust.shape[0]):
-        out[THRUST] += lane(point.node_dual[k, 0], place) * tau
+    for k in range(intervals):
+        out[THRUST] += point.node_dual[k, 0] * point.y[0]
     for j in range(arcs):
-        out[THRUST] += lane(point.cone_dual[j, 0] * solver.model.cone_map[j, 0, 0], place) * tau
+        out[THRUST] += point.cone_dual[j, 0] * single.model.cone_map[j, 0, 0] * point.y[0]
     for j in range(arcs, arcs + 2):
-        out[GLIDE_SLOPE] += lane(point.cone_dual[j, 0] * point.cone_slack[j, 0], place)
+        out[GLIDE_SLOPE] += point.cone_dual[j, 0] * point.cone_slack[j, 0]
     for c in range(planes):
-        kind = ELLIPSOID if lane(cuts.tangent[c], place) > 0.0 else TERRAIN
-        out[kind] -= lane(point.multiplier[plan.first_plane + c], place) * abs(lane(cuts.offset[c], place))
+        kind = ELLIPSOID if cuts.tangent[c] > 0.0 else TERRAIN
+        out[kind] -= point.multiplier[plan.first_plane + c] * abs(cuts.offset[c])
     if case.on_ellipsoid:
-        out[HANDOVER] = abs(lane(point.multiplier[6], place))
+        out[HANDOVER] = abs(point.multiplier[6])
     if case.propellant < 1.0:
-        out[PROPELLANT] = -lane(point.multiplier[plan.first_plane - 1], place) * case.propellant
+        out[PROPELLANT] = -point.multiplier[plan.first_plane - 1] * case.propellant
 
 
-@kernel
+@inner
+def _keep(
+    i: int,
+    place: int,
+    case: ScaledCase,
+    plan: Layout,
+    solver: Solver,
+    single: Single,
+    planes: int,
+    cuts: CutBatch,
+    out: Batch,
+) -> None:
+    """Copy the answer in a lane to facet i of a batch; one that ended on the half grid has no flight."""
+    point, own, status = solver.point, single.point, out.status[i]
+    intervals = point.thrust.shape[0]
+    out.energy[i], out.level[i] = lane(solver.numbers[ENERGY], place), lane(point.y[0], place)
+    if intervals == out.thrust.shape[1]:
+        take_lane(point.thrust, place, out.thrust[i])
+        take_lane(solver.path.position, place, out.position[i])
+        take_lane(solver.cuts.normal, place, cuts.normal[i])
+    if status in (CONVERGED, CERTIFIED):
+        take_lane(point.multiplier, place, own.multiplier)
+        take_lane(point.y, place, own.y)
+        take_lane(point.node_dual, place, own.node_dual)
+        take_lane(point.cone_dual, place, own.cone_dual)
+        take_lane(point.cone_slack, place, own.cone_slack)
+        take_lane(solver.model.cone_map, place, single.model.cone_map)
+        take_lane(solver.cuts.tangent, place, single.cuts.tangent)
+        take_lane(solver.cuts.offset, place, single.cuts.offset)
+        keep_pressure(case, plan, single, intervals, planes, out.pressure[i])
+    if status == CONVERGED:
+        take_lane(solver.model.row_mix, place, single.model.row_mix)
+        take_lane(solver.path.to_start, place, single.to_start)
+        take_lane(solver.numbers, place, single.numbers)
+        keep_costates(case, plan, single, out.costates[i])
+
+
+@inner
 def _load(
     i: int,
     place: int,
@@ -170,68 +208,41 @@ def _load(
     walls: WallBatch,
     first_plane: int,
     solver: Solver,
+    single: Single,
 ) -> None:
     """Put facet i of a batch into a lane: its place, and its planes."""
-    own, live = solver.cuts, solver.model.row_live
-    for a in range(3):
-        solver.target[a] = with_lane(solver.target[a], place, targets[i, a])
-        solver.normal[a] = with_lane(solver.normal[a], place, normals[i, a])
+    own, live = single.cuts, single.model.row_live
+    put_lane(solver.target, place, targets[i])
+    put_lane(solver.normal, place, normals[i])
+    own.node[:], own.fraction[:], own.offset[:], own.tangent[:] = 0.0, 0.0, 0.0, 0.0
+    own.normal[:, :] = 0.0
+    live[:] = 0.0
+    live[:first_plane] = 1.0
     count = cuts.planes[i]
-    for c in range(own.node.shape[0]):
-        w = c - count
-        tangent = there = 0.0
-        node = fraction = offset = n0 = n1 = n2 = 0.0
-        if c < count:
-            tangent, there, offset, node = 1.0, 1.0, keep_level[i], float(cuts.node[i, c])
-            n0, n1, n2 = cuts.normal[i, c, 0], cuts.normal[i, c, 1], cuts.normal[i, c, 2]
-        elif w < walls.walls[i]:
-            there, offset, node = 1.0, walls.offset[i, w], float(walls.node[i, w])
-            fraction = walls.fraction[i, w]
-            n0, n1, n2 = walls.normal[i, w, 0], walls.normal[i, w, 1], walls.normal[i, w, 2]
-        own.tangent[c], own.node[c] = (
-            with_lane(own.tangent[c], place, tangent),
-            with_lane(own.node[c], place, node),
+    for c in range(count):
+        own.node[c], own.offset[c], own.tangent[c] = cuts.node[i, c], keep_level[i], 1.0
+        for a in range(3):
+            own.normal[c, a] = cuts.normal[i, c, a]
+        live[first_plane + c] = 1.0
+    for w in range(walls.walls[i]):
+        c = count + w
+        own.node[c], own.fraction[c], own.offset[c] = (
+            walls.node[i, w],
+            walls.fraction[i, w],
+            walls.offset[i, w],
         )
-        own.fraction[c], own.offset[c] = (
-            with_lane(own.fraction[c], place, fraction),
-            with_lane(own.offset[c], place, offset),
-        )
-        n = own.normal[c]
-        n[0], n[1], n[2] = with_lane(n[0], place, n0), with_lane(n[1], place, n1), with_lane(n[2], place, n2)
-        live[first_plane + c] = with_lane(live[first_plane + c], place, there)
-
-
-@kernel
-def _keep(
-    i: int,
-    place: int,
-    case: ScaledCase,
-    plan: Layout,
-    solver: Solver,
-    mass_costate: float,
-    cuts: CutBatch,
-    planes: int,
-    out: Batch,
-) -> None:
-    """Copy the answer in a lane to facet i of a batch."""
-    point, path = solver.point, solver.path
-    out.level[i] = lane(point.y[0], place)
-    for k in range(out.thrust.shape[1]):
         for a in range(3):
-            out.thrust[i, k, a] = lane(point.thrust[k, a], place)
-    for k in range(out.position.shape[1]):
-        for a in range(3):
-            out.position[i, k, a] = lane(path.position[k, a], place)
-    for c in range(cuts.planes[i]):
-        for a in range(3):
-            cuts.normal[i, c, a] = lane(solver.cuts.normal[c, a], place)
-    if out.status[i] == CONVERGED:
-        keep_costates(case, plan, solver, place, mass_costate, out.costates[i])
-    if out.status[i] == CONVERGED or out.status[i] == CERTIFIED:
-        keep_pressure(case, plan, solver, place, planes, out.pressure[i])
+            own.normal[c, a] = walls.normal[i, w, a]
+        live[first_plane + c] = 1.0
+    put_lane(solver.cuts.node, place, own.node)
+    put_lane(solver.cuts.normal, place, own.normal)
+    put_lane(solver.cuts.fraction, place, own.fraction)
+    put_lane(solver.cuts.offset, place, own.offset)
+    put_lane(solver.cuts.tangent, place, own.tangent)
+    put_lane(solver.model.row_live, place, live)
 
 
-@kernel
+@inner
 def _fill_order(planes: Ints, walls: Ints, most: int, order: Ints) -> None:
     """Facets with many planes first: lanes with as many rows share less of what the others do not need."""
     at = np.int64(0)
@@ -240,6 +251,152 @@ def _fill_order(planes: Ints, walls: Ints, most: int, order: Ints) -> None:
             if planes[i] + walls[i] == many:
                 order[at] = i
                 at += 1
+
+
+@inner
+def _take_in(
+    order: Ints,
+    loaded: int,
+    halved: bool,
+    first_plane: int,
+    targets: Floats,
+    normals: Floats,
+    cuts: CutBatch,
+    keep_level: Floats,
+    walls: WallBatch,
+    solver: LaneSolver,
+) -> tuple[int, int]:
+    """Fill idle lanes: with begun facets, or with the next ones of the batch, which may have to begin.
+
+    Returns
+    -------
+    loaded : int
+        How many of the batch were taken so far.
+    side : int
+        What is to be iterated next: 0 the lanes, 1 the begun.
+    """
+    facet, iteration, n = solver.facet, solver.iteration, order.shape[0]
+    for place in range(WIDTH):
+        if facet[1, place] >= 0 and iteration[1, place] < BEGINNING:
+            return loaded, 1
+    side, w = 0, 0
+    for place in range(WIDTH):
+        while w < WIDTH and facet[1, w] < 0:
+            w += 1
+        begun = w < WIDTH
+        i = facet[1, w] if begun else order[min(loaded, n - 1)]
+        if facet[0, place] >= 0 or (not begun and loaded == n):
+            continue
+        if not begun and halved and cuts.planes[i] + walls.walls[i] == 0:
+            side = 1
+            break
+        _load(i, place, targets, normals, cuts, keep_level, walls, first_plane, solver.lanes, solver.single)
+        facet[0, place], iteration[0, place], solver.bound[0, place] = i, 0, 0.0
+        if begun:
+            hand_over(w, place, solver)
+            iteration[0, place], solver.bound[0, place], facet[1, w] = BEGINNING, solver.bound[1, w], -1
+        else:
+            loaded += 1
+    for place in range(WIDTH):
+        if side == 1 and loaded < n:
+            i = order[loaded]
+            _load(
+                i, place, targets, normals, cuts, keep_level, walls, first_plane, solver.begun, solver.single
+            )
+            facet[1, place], iteration[1, place], solver.bound[1, place] = i, 0, 0.0
+            loaded += 1
+    return loaded, side
+
+
+@inlined
+def _turn(
+    case: ScaledCase,
+    side: int,
+    energy_weight: float,
+    tau_free: bool,
+    retake_from: int,
+    limit: int,
+    tube: Floats,
+    arc_bound: float,
+    prove: bool,
+    cuts: CutBatch,
+    walls: WallBatch,
+    lanes: Solver,
+    solver: LaneSolver,
+    out: Batch,
+) -> bool:
+    """One iteration of the lanes, or of the begun; tells whether there was any facet."""
+    facet, iteration, bound = solver.facet[side], solver.iteration[side], solver.bound[side]
+    first, planes, active, marks = BEGINNING if side == 0 else 0, np.int64(0), False, lanes.marks
+    for mark in range(4):
+        marks[mark] = 0.0
+    for place in range(WIDTH):
+        i = facet[place]
+        if i < 0:
+            continue
+        active = True
+        planes = max(planes, cuts.planes[i] + walls.walls[i])
+        if iteration[place] == 0:
+            marks[BEGINS] = with_lane(marks[BEGINS], place, 1.0)
+        if iteration[place] == 0 or iteration[place] == first:
+            marks[NEW] = with_lane(marks[NEW], place, 1.0)
+        iteration[place] += 1
+        if iteration[place] > 1 and iteration[place] % DEFECT_PERIOD == FIRST_DEFECT:
+            marks[MEASURED] = with_lane(marks[MEASURED], place, 1.0)
+        if iteration[place] >= retake_from:
+            marks[RETAKEN] = with_lane(marks[RETAKEN], place, 1.0)
+    if not active:
+        return False
+    plan = layout(case, planes, energy_weight, tau_free)
+    linearise(case, plan, lanes)
+    goes_on = False
+    for place in range(WIDTH):
+        i = facet[place]
+        if i < 0:
+            continue
+        outcome = judge(
+            case,
+            plan,
+            lanes,
+            place,
+            iteration[place],
+            cuts.planes[i],
+            tube,
+            arc_bound,
+            limit,
+            prove,
+            solver.single,
+            bound[place],
+        )
+        bound[place] = outcome.bound
+        if outcome.status < 0:
+            goes_on = True
+            continue
+        out.status[i], out.iterations[i], out.bound[i] = outcome.status, iteration[place], outcome.bound
+        count = cuts.planes[i] + walls.walls[i]
+        _keep(i, place, case, plan, lanes, solver.single, count, cuts, out)
+        facet[place] = -1
+    if goes_on:
+        take_step(plan, lanes)
+    return True
+
+
+@inlined
+def _fill_drift(case: ScaledCase, plan: Layout, lanes: Solver, begun: Solver) -> None:
+    """Fly without thrust: all facets' starts are reckoned from there."""
+    n = lanes.point.thrust.shape[0]
+    for k in range(n):
+        for i in range(3):
+            lanes.point.thrust[k, i] = 0.0
+    for i in range(6):
+        lanes.path.defect[i] = 0.0
+    for mark in range(4):
+        lanes.marks[mark] = 0.0
+    linearise(case, plan, lanes)
+    for i in range(3):
+        lanes.drift[i], lanes.drift[3 + i] = lanes.path.position[n, i], lanes.path.velocity[n, i]
+    for i in range(6):
+        begun.drift[i] = lanes.drift[i]
 
 
 @kernel
@@ -291,51 +448,32 @@ def solve_many(
     out : Batch
         Filled.
     """
-    lanes, facet, iteration = solver.lanes, solver.facet, solver.iteration
-    n, loaded, marks = targets.shape[0], np.int64(0), lanes.marks
-    order = np.empty(n, dtype=np.int64)
+    lanes, begun, half = solver.lanes, solver.begun, solver.half
+    loaded, going = np.int64(0), targets.shape[0] > 0
+    order = np.empty(targets.shape[0], dtype=np.int64)
     _fill_order(cuts.planes, walls.walls, lanes.cuts.node.shape[0], order)
-    first_plane = layout(case, 0, energy_weight, tau_free).first_plane
-    fill_drift(case, lanes)
-    facet[:] = -1
-    while True:
-        marks[0] = marks[1] = marks[2] = 0.0
-        active, planes = False, np.int64(0)
-        for place in range(WIDTH):
-            if facet[place] < 0 and loaded < n:
-                facet[place], iteration[place], solver.bound[place] = order[loaded], 0, 0.0
-                loaded += 1
-                _load(facet[place], place, targets, normals, cuts, keep_level, walls, first_plane, lanes)
-                marks[0] = with_lane(marks[0], place, 1.0)
-            if facet[place] < 0:
-                continue
-            active = True
-            planes = max(planes, cuts.planes[facet[place]] + walls.walls[facet[place]])
-            iteration[place] += 1
-            if iteration[place] > 1 and iteration[place] % DEFECT_PERIOD == FIRST_DEFECT:
-                marks[1] = with_lane(marks[1], place, 1.0)
-            if iteration[place] >= retake_from:
-                marks[2] = with_lane(marks[2], place, 1.0)
-        if not active:
-            break
-        plan = layout(case, planes, energy_weight, tau_free)
-        linearise(case, plan, lanes)
-        numbers, goes_on = lanes.numbers, False
-        for place in range(WIDTH):
-            i = facet[place]
-            if i < 0:
-                continue
-            residual = lane(numbers[PRIMAL], place), lane(numbers[DUAL], place), lane(numbers[GAP], place)
-            outcome = judge(
-                case, plan, place, residual, cuts.planes[i], tube, arc_bound, limit, prove, solver
-            )
-            if outcome.status < 0:
-                goes_on = True
-                continue
-            out.status[i], out.iterations[i], out.bound[i] = outcome.status, iteration[place], outcome.bound
-            out.energy[i] = lane(numbers[ENERGY], place)
-            count = cuts.planes[i] + walls.walls[i]
-            _keep(i, place, case, plan, lanes, lane(numbers[MASS_COSTATE], place), cuts, count, out)
-            facet[place] = -1
-        if goes_on:
-            take_step(plan, lanes)
+    plan = layout(case, loaded, energy_weight, tau_free)
+    _fill_drift(case, plan, lanes, begun)
+    solver.facet[:, :] = -1
+    halved = not prove and lanes.point.thrust.shape[0] >= HALVED_FROM
+    while going:
+        loaded, side = _take_in(
+            order, loaded, halved, plan.first_plane, targets, normals, cuts, keep_level, walls, solver
+        )
+        at, current = (half, begun) if side == 1 else (case, lanes)
+        going = _turn(
+            at,
+            side,
+            energy_weight,
+            tau_free,
+            retake_from,
+            limit,
+            tube,
+            arc_bound,
+            prove,
+            cuts,
+            walls,
+            current,
+            solver,
+            out,
+        )

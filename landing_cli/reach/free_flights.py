@@ -15,7 +15,7 @@ from landing_cli.reach.ellipsoid_arcs import (
     lowest_levels_between,
 )
 from landing_cli.reach.free_batch import Batch, CutBatch, WallBatch, new_batch, no_cuts, no_walls, solve_many
-from landing_cli.reach.free_solve import CONVERGED, STALLED, new_solver
+from landing_cli.reach.free_solve import CONVERGED, STALLED, own_solver
 from landing_cli.reach.scaled_case import ScaledCase
 
 Floats = NDArray[np.float64]
@@ -210,6 +210,8 @@ def _solve(
     walls: WallBatch | None = None,
 ) -> Batch:
     """Run the kernel on a whole batch."""
+    if len(question.targets) == 0:
+        return new_batch(0, len(question.case.mid_cos))
     walls = no_walls(len(question.targets)) if walls is None else walls
     out = new_batch(len(question.targets), len(question.case.mid_cos))
     solve_many(
@@ -226,7 +228,7 @@ def _solve(
         question.tube,
         question.arc_bound,
         False,
-        new_solver(question.case, walls.node.shape[1]),
+        own_solver(question.case, walls.node.shape[1]),
         out,
     )
     return out

@@ -8,14 +8,15 @@ as there are lanes are iterated together (`kernel_lanes`); each has its own coun
 from __future__ import annotations
 
 import math
+import threading
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import inlined, kernel
-from landing_cli.kernel_lanes import WIDTH, any_lane, choose, lane, new_lanes
-from landing_cli.kernel_record import by_reference
+from landing_cli.kernel import inlined, inner
+from landing_cli.kernel_lanes import WIDTH, any_lane, choose, lane, new_lanes, put_lane, take_lane
+from landing_cli.kernel_record import always_alike, by_reference
 from landing_cli.optimize.conic_ipm import advance, residuals
 from landing_cli.optimize.conic_records import STATE, Model, New, Point, Step, new_model, new_point, new_step
 from landing_cli.reach.certificate import certified_thrust_level, linearised_thrust_level
@@ -29,7 +30,7 @@ from landing_cli.reach.descent_model import (
 )
 from landing_cli.reach.planes import Cuts, new_cuts
 from landing_cli.reach.scaled_case import ScaledCase
-from landing_cli.reach.shooting import Path, fly, measure_defect, new_path
+from landing_cli.reach.shooting import Path, measure_defect, new_path
 
 Floats = NDArray[np.float64]
 
@@ -43,6 +44,13 @@ FIRST_CERTIFICATE = 4
 FIRST_BLOCKED, BLOCKED_LEVEL = 8, 1.0 + 1e-4
 # The defect of the flight is measured at iterations 5, 9, 13, ...: it hardly changes after that.
 FIRST_DEFECT, DEFECT_PERIOD = 1, 4
+# Facets without planes begin on half as many intervals, where there are so many, for so many iterations.
+HALVED_FROM, BEGINNING = 40, 4
+_kept = threading.local()
+
+# Places in a solver's marks, 1 in lanes: the facet begins, its flight's defect is measured, its planes are
+# retaken, it is new to the lane.
+BEGINS, MEASURED, RETAKEN, NEW = range(4)
 # Places in a solver's numbers: residuals and gap, J (scaled), the mass costate at the start, the least target
 # of the next step.
 PRIMAL, DUAL, GAP, ENERGY, MASS_COSTATE, LEAST_TARGET = range(6)
@@ -60,9 +68,8 @@ class Solver(NamedTuple):
     target: Floats  # (3,) touchdown point, scaled, body axes
     normal: Floats  # (3,) of the facet, outward
     drift: Floats  # (6,) position and velocity at the end of the flight without thrust
-    marks: Floats  # (3,) 1 where a facet begins, its flight's defect is measured, its planes are retaken
+    marks: Floats  # (4,) see BEGINS to NEW
     numbers: Floats  # (6,) of the iteration: see PRIMAL to LEAST_TARGET
-    duals: Floats  # (J, 4)
 
 
 @by_reference
@@ -73,18 +80,22 @@ class Single(NamedTuple):
     model: Model
     cuts: Cuts
     target: Floats  # (3,)
+    to_start: Floats  # (6, 6)
+    numbers: Floats  # (6,)
     duals: Floats  # (J, 4) scratch space
 
 
-@by_reference
+@always_alike
 class LaneSolver(NamedTuple):
     """A solver of as many facets as there are lanes."""
 
     lanes: Solver
+    begun: Solver  # on half as many intervals, for the first iterations of facets without planes
+    half: ScaledCase  # the case on these
     single: Single
-    facet: NDArray[np.int64]  # (WIDTH,) place in the batch, -1: none
-    iteration: NDArray[np.int64]  # (WIDTH,)
-    bound: Floats  # (WIDTH,)
+    facet: NDArray[np.int64]  # (2, WIDTH) place in the batch, -1: none; of the lanes, then of the begun
+    iteration: NDArray[np.int64]  # (2, WIDTH)
+    bound: Floats  # (2, WIDTH)
 
 
 class Outcome(NamedTuple):
@@ -107,9 +118,8 @@ def new_solver_of(
         new(3),
         new(3),
         new(6),
-        new(3),
+        new(4),
         new(6),
-        new((n_cones, 4)),
     )
 
 
@@ -120,39 +130,47 @@ def basis_of(case: ScaledCase) -> int:
 
 def new_solver(case: ScaledCase, walls: int = 0) -> LaneSolver:
     """Allocate a solver for a scaled case, with room for so many walls off the terrain."""
-    n = case.mid_cos.shape[0]
+    n, basis = case.mid_cos.shape[0], basis_of(case)
     n_cones = case.arc_fractions.shape[0] + 2
     planes = n + 1 + walls
     n_rows = 7 + planes + 2
     whole = np.int64
     return LaneSolver(
-        new_solver_of(n, n_cones, n_rows, planes, basis_of(case), new_lanes),
+        new_solver_of(n, n_cones, n_rows, planes, basis, new_lanes),
+        new_solver_of(n // 2, n_cones, 9, 0, basis, new_lanes),
+        on_half(case),
         Single(
             new_point(n, n_cones, n_rows),
-            new_model(n, n_cones, n_rows, basis_of(case)),
+            new_model(n, n_cones, n_rows, basis),
             new_cuts(planes),
             np.zeros(3),
+            np.zeros((6, 6)),
+            np.zeros(6),
             np.zeros((n_cones, 4)),
         ),
-        np.full(WIDTH, -1, dtype=whole),
-        np.zeros(WIDTH, dtype=whole),
-        np.zeros(WIDTH),
+        np.full((2, WIDTH), -1, dtype=whole),
+        np.zeros((2, WIDTH), dtype=whole),
+        np.zeros((2, WIDTH)),
     )
 
 
-@kernel
-def fill_drift(case: ScaledCase, solver: Solver) -> None:
-    """Fly without thrust: all facets' starts are reckoned from there."""
-    point, path, drift = solver.point, solver.path, solver.drift
-    n = path.gradient.shape[0]
-    for k in range(n):
-        for i in range(3):
-            point.thrust[k, i] = 0.0
-    for i in range(6):
-        path.defect[i] = 0.0
-    fly(case, point.thrust, path)
-    for i in range(3):
-        drift[i], drift[3 + i] = path.position[n, i], path.velocity[n, i]
+def own_solver(case: ScaledCase, walls: int = 0) -> LaneSolver:
+    """Return this thread's solver for cases of such sizes and rows: making one takes as long as a facet."""
+    key = case.mid_cos.shape[0], case.arc_fractions.shape[0], walls, basis_of(case), case.on_ellipsoid
+    if key not in _kept.__dict__.setdefault("solvers", {}):
+        _kept.solvers[key] = new_solver(case, walls)
+    solver: LaneSolver = _kept.solvers[key]._replace(half=on_half(case))
+    return solver
+
+
+def on_half(case: ScaledCase) -> ScaledCase:
+    """The case on half as many intervals, each made of two."""
+    return case._replace(
+        node_cos=case.node_cos[::2].copy(),
+        node_sin=case.node_sin[::2].copy(),
+        mid_cos=case.node_cos[1::2].copy(),
+        mid_sin=case.node_sin[1::2].copy(),
+    )
 
 
 @inlined
@@ -179,7 +197,7 @@ def _start_thrust(case: ScaledCase, begins: bool, solver: Solver) -> float:
         12.0 * (x1 - drift[1] - 0.5 * v1),
         12.0 * (x2 - drift[2] - 0.5 * v2),
     )
-    used = 0.0
+    used = choose(x0 > 0.0, 0.0, 0.0)
     for k in range(n):
         F, s = point.thrust[k], 0.5 - (k + 0.5) / n
         f0, f1, f2 = v0 + a0 * s, v1 + a1 * s, v2 + a2 * s
@@ -191,17 +209,22 @@ def _start_thrust(case: ScaledCase, begins: bool, solver: Solver) -> float:
     return 1.0 - case.mass_flow * used / n
 
 
-@kernel
+@inlined
+def fill_constants(case: ScaledCase, solver: Solver) -> None:
+    """Fill what stays as it is while facets are solved."""
+    fill_handover_rows(case, solver.model)
+    fill_arc_cones(case, solver.model)
+    fill_glide_cones(case, solver.normal, solver.model)
+
+
+@inlined
 def cold_start(case: ScaledCase, plan: Layout, begins: bool, solver: Solver) -> None:
     """Set the iterate to a well-centred point where a facet begins; the objective's scale sets the duals.
 
-    The solver's target, normal, drift, planes and ``row_live`` of the planes are given.
+    The solver's target, normal, drift, constants, planes and ``row_live`` are given.
     """
     point, model = solver.point, solver.model
     handover_mass = _start_thrust(case, begins, solver)
-    fill_handover_rows(case, model)
-    fill_arc_cones(case, model)
-    fill_glide_cones(case, solver.normal, model)
     n = point.thrust.shape[0]
     scale = 1.0 if plan.tau_free else plan.energy_weight
     for i in range(6):
@@ -215,8 +238,6 @@ def cold_start(case: ScaledCase, plan: Layout, begins: bool, solver: Solver) -> 
             tail = -0.3 * head * point.thrust[k, i] / point.y[0]
             z[1 + i] = choose(begins, tail, z[1 + i])
     for r in range(point.multiplier.shape[0]):
-        if r < plan.first_plane:
-            model.row_live[r] = 1.0
         held = 0.0 if r < plan.n_equal else 0.05
         # a row that is not there has no slack, and a multiplier that only keeps divisions finite
         there = model.row_live[r] > 0.0
@@ -240,94 +261,69 @@ def cold_start(case: ScaledCase, plan: Layout, begins: bool, solver: Solver) -> 
         s[0] = choose(begins, max(head, math.sqrt(norm2) + 0.1), s[0])
 
 
-@kernel
-def take_out(case: ScaledCase, plan: Layout, place: int, wanted: int, solver: Solver, single: Single) -> None:
-    """Copy what the certificates look at out of a lane.
-
-    Parameters
-    ----------
-    case, plan : ScaledCase, Layout
-        The case, its rows and cones.
-    place : int
-        Which lane.
-    wanted : int
-        0: what a proof about all flights takes; 1: with the planes; 2: the whole linearised problem.
-    solver : Solver
-        In lanes.
-    single : Single
-        Filled.
-    """
-    point, model, one, its = solver.point, solver.model, single.point, single.model
-    rows = 6 if wanted == 0 else plan.n_rows
-    for r in range(rows):
-        one.multiplier[r] = lane(point.multiplier[r], place)
-        for a in range(7):
-            its.row_y[r, a] = lane(model.row_y[r, a], place)
-    for j in range(plan.n_cones):
+@inner
+def hand_over(place: int, to: int, solver: LaneSolver) -> None:
+    """Go on with a begun facet on twice as many intervals: each halves, and so do the duals of its thrust."""
+    source, into, single = solver.begun, solver.lanes, solver.single
+    old, new, own = source.point, into.point, single.point
+    take_lane(old.thrust, place, own.thrust)
+    take_lane(old.node_dual, place, own.node_dual)
+    for k in range(own.thrust.shape[0] - 1, -1, -1):
+        for i in range(3):
+            own.thrust[k, i] = own.thrust[k // 2, i]
         for i in range(4):
-            one.cone_dual[j, i] = lane(point.cone_dual[j, i], place)
-            for a in range(7):
-                its.cone_map[j, i, a] = lane(model.cone_map[j, i, a], place)
-    for i in range(3):
-        single.target[i] = lane(solver.target[i], place)
-    if wanted == 1:
-        first = 7 if case.on_ellipsoid else 6
-        for c in range(plan.n_rows - plan.first_plane):
-            one.multiplier[first + c] = lane(point.multiplier[plan.first_plane + c], place)
-            single.cuts.node[c] = lane(solver.cuts.node[c], place)
-            for i in range(3):
-                single.cuts.normal[c, i] = lane(solver.cuts.normal[c, i], place)
-    if wanted == 2:
-        for r in range(rows):
-            its.row_value[r] = lane(model.row_value[r], place)
-        for a in range(7):
-            one.y[a] = lane(point.y[a], place)
-        for j in range(plan.n_cones):
-            for i in range(4):
-                its.cone_offset[j, i] = lane(model.cone_offset[j, i], place)
-        for k in range(point.thrust.shape[0]):
-            for i in range(3):
-                one.thrust[k, i] = lane(point.thrust[k, i], place)
-                its.row_pull[k, i] = lane(model.row_pull[k, i], place)
+            own.node_dual[k, i] = 0.5 * own.node_dual[k // 2, i]
+    own.multiplier[:] = -1.0  # as of rows that are not there
+    own.slack[:] = 0.0
+    take_lane(old.multiplier, place, own.multiplier)
+    take_lane(old.slack, place, own.slack)
+    take_lane(old.cone_slack, place, own.cone_slack)
+    put_lane(new.cone_slack, to, own.cone_slack)
+    take_lane(old.cone_dual, place, own.cone_dual)
+    put_lane(new.cone_dual, to, own.cone_dual)
+    take_lane(old.y, place, own.y)
+    put_lane(new.y, to, own.y)
+    put_lane(new.thrust, to, own.thrust)
+    put_lane(new.node_dual, to, own.node_dual)
+    put_lane(new.multiplier, to, own.multiplier)
+    put_lane(new.slack, to, own.slack)
+    single.numbers[:] = 0.0
+    put_lane(into.path.defect, to, single.numbers)
 
 
-@kernel
-def _certificate(
-    case: ScaledCase,
-    tube: Floats,
-    arc_bound: float,
-    planes: int,
-    level: float,
-    single: Single,
-) -> float:
-    """Bound the thrust level by the multipliers that were taken out."""
-    return certified_thrust_level(
-        case,
-        single.target,
-        tube,
-        arc_bound,
-        single.model,
-        single.point.multiplier,
-        single.point.cone_dual,
-        single.duals,
-        single.cuts,
-        planes,
-        level,
-    )
+@inner
+def take_out(solver: Solver, place: int, whole: bool, single: Single) -> None:
+    """Copy what the certificates look at out of a lane; the whole linearised problem, or its duals."""
+    point, model, own, its = solver.point, solver.model, single.point, single.model
+    take_lane(point.multiplier, place, own.multiplier)
+    take_lane(point.cone_dual, place, own.cone_dual)
+    take_lane(model.cone_map, place, its.cone_map)
+    take_lane(model.row_y, place, its.row_y)
+    take_lane(solver.target, place, single.target)
+    take_lane(solver.cuts.node, place, single.cuts.node)
+    take_lane(solver.cuts.normal, place, single.cuts.normal)
+    if whole:
+        take_lane(model.row_value, place, its.row_value)
+        take_lane(model.row_pull, place, its.row_pull)
+        take_lane(model.cone_offset, place, its.cone_offset)
+        take_lane(point.y, place, own.y)
+        take_lane(point.thrust, place, own.thrust)
 
 
-@kernel
+@inner
 def judge(
     case: ScaledCase,
     plan: Layout,
+    solver: Solver,
     place: int,
-    residual: tuple[float, float, float],
+    iteration: int,
     planes: int,
     tube: Floats,
     arc_bound: float,
     limit: int,
     prove: bool,
-    solver: LaneSolver,
+    single: Single,
+    known: float,
 ) -> Outcome:
     """Tell whether the facet in a lane is done.
 
@@ -335,10 +331,12 @@ def judge(
     ----------
     case, plan : ScaledCase, Layout
         The case, its rows and cones.
+    solver : Solver
+        In lanes, linearised.
     place : int
         Which lane.
-    residual : (3,) float
-        Primal and dual residual and gap, of the lane.
+    iteration : int
+        Of the facet.
     planes : int
         Tangent planes of the facet.
     tube, arc_bound : (N,) float, float
@@ -348,53 +346,74 @@ def judge(
     prove : bool
         Bound the thrust level of the flights that keep to the planes, not of all flights, and stop as soon
         as that is above 1.
-    solver : LaneSolver
-        Its lane's bound is updated.
+    single : Single
+        Scratch space.
+    known : float
+        The bound so far.
 
     Returns
     -------
     outcome : Outcome
         How it ended, if it did.
     """
-    primal, dual, gap = residual
+    numbers = single.numbers
+    take_lane(solver.numbers, place, numbers)
     scale = 1.0 if plan.tau_free else plan.energy_weight
-    iteration, bound, single = solver.iteration[place], solver.bound[place], solver.single
-    level = lane(solver.lanes.cuts.offset[0], place) if prove and planes > 0 else 1.0
-    wanted, counted = (1, planes) if prove else (0, 0)
     converged = (
         iteration > DEFECT_PERIOD
-        and primal < TOLERANCE
-        and dual < DUAL_TOLERANCE * scale
-        and gap < GAP_TOLERANCE * scale
+        and numbers[PRIMAL] < TOLERANCE
+        and numbers[DUAL] < DUAL_TOLERANCE * scale
+        and numbers[GAP] < GAP_TOLERANCE * scale
     )
-    status = CONVERGED if converged else -1
-    if (plan.tau_free and converged) or (
-        (prove or not plan.tau_free) and not converged and iteration >= FIRST_CERTIFICATE
-    ):
-        take_out(case, plan, place, wanted, solver.lanes, single)
-        bound = max(bound, _certificate(case, tube, arc_bound, counted, level, single))
-        solver.bound[place] = bound
+    status, bound = CONVERGED if converged else -1, known
+    proves = (prove or not plan.tau_free) and not converged and iteration >= FIRST_CERTIFICATE
+    blocks = not plan.tau_free and not converged and iteration >= FIRST_BLOCKED
+    if proves or (plan.tau_free and converged):
+        take_out(solver, place, blocks, single)
+        counted = planes if prove else planes - planes
+        level = lane(solver.cuts.offset[0], place) if counted > 0 else 1.0
+        if counted > 0:  # the certificate looks for the planes' multipliers here
+            first = 7 if case.on_ellipsoid else 6
+            for c in range(counted):
+                single.point.multiplier[first + c] = single.point.multiplier[plan.first_plane + c]
+        bound = max(
+            bound,
+            certified_thrust_level(
+                case,
+                single.target,
+                tube,
+                arc_bound,
+                single.model,
+                single.point.multiplier,
+                single.point.cone_dual,
+                single.duals,
+                single.cuts,
+                counted,
+                level,
+            ),
+        )
         if bound > 1.0 and not converged:
             status = CERTIFIED
-    if status < 0 and not plan.tau_free and iteration >= FIRST_BLOCKED:
-        take_out(case, plan, place, 2, solver.lanes, single)
+    if status < 0 and blocks:
         needed = linearised_thrust_level(case, plan, single.point, single.model, single.duals)
         if needed > BLOCKED_LEVEL:
             status = BLOCKED
-    if status < 0 and (iteration >= limit or not math.isfinite(gap)):
+    if status < 0 and (iteration >= limit or not math.isfinite(numbers[GAP])):
         status = STALLED
     return Outcome(status, bound)
 
 
-@kernel
+@inner
 def linearise(case: ScaledCase, plan: Layout, solver: Solver) -> None:
-    """Start the facets that begin, linearise all lanes' problems anew and fill the solver's numbers."""
+    """Linearise all lanes' problems anew and fill the solver's numbers; see their marks."""
     point, model, path, marks, numbers = solver.point, solver.model, solver.path, solver.marks, solver.numbers
-    begins = marks[0] > 0.0
+    if any_lane(marks[NEW] > 0.0):
+        fill_constants(case, solver)
+    begins = marks[BEGINS] > 0.0
     if any_lane(begins):
         cold_start(case, plan, begins, solver)
-    measure_defect(case, point.thrust, path, marks[1] > 0.0)
-    retake = marks[2] > 0.0
+    measure_defect(case, point.thrust, path, marks[MEASURED] > 0.0)
+    retake = marks[RETAKEN] > 0.0
     energy, mass_costate = refresh(case, solver.target, plan, solver.cuts, retake, point, path, model)
     primal, dual, gap = residuals(
         point, model, solver.step, plan.n_equal, plan.n_rows, plan.n_cones, plan.tau_free
@@ -408,7 +427,7 @@ def linearise(case: ScaledCase, plan: Layout, solver: Solver) -> None:
     numbers[LEAST_TARGET] = 0.1 * TOLERANCE * scale / size
 
 
-@kernel
+@inner
 def take_step(plan: Layout, solver: Solver) -> None:
     """Move all lanes by one predictor-corrector step."""
     gap, least = solver.numbers[GAP], solver.numbers[LEAST_TARGET]

@@ -14,7 +14,7 @@ from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.harmonics import harmonics_acceleration, harmonics_acceleration_and_gradient
 from landing_cli.body.gravity.kernel_types import Params, Vector, VectorAndSymmetric
 from landing_cli.body.gravity.models import number_of
-from landing_cli.kernel import kernel
+from landing_cli.kernel import inner
 from landing_cli.kernel_lanes import WIDTH, lane, lanes, with_lane
 
 _overload: Any = extending.overload
@@ -34,7 +34,7 @@ def acceleration_and_gradient(
     raise NotImplementedError
 
 
-@kernel
+@inner
 def _accelerations(kind: GravityKind, params: Params, x: float, y: float, z: float) -> Vector:
     if number_of(kind) == _HARMONICS:
         return harmonics_acceleration(params, x, y, z)
@@ -45,7 +45,7 @@ def _accelerations(kind: GravityKind, params: Params, x: float, y: float, z: flo
     return gx, gy, gz
 
 
-@kernel
+@inner
 def _accelerations_and_gradients(
     kind: GravityKind, params: Params, x: float, y: float, z: float
 ) -> VectorAndSymmetric:

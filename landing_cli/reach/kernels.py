@@ -10,6 +10,7 @@ import os
 from collections.abc import Callable
 from typing import Any
 
+import numba
 import numpy as np
 
 from landing_cli.body.adjacency import mean_edge_m
@@ -19,14 +20,16 @@ from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.body.ray_cast import first_hits_into
 from landing_cli.compile_cache import is_cached
 from landing_cli.parallel.forks import share_out
-from landing_cli.reach.certificate import GravityBounds
+from landing_cli.reach.certificate import GravityBounds, certified_thrust_level, linearised_thrust_level
 from landing_cli.reach.delivery import deliver_many, new_deliveries
 from landing_cli.reach.descent_model import layout
 from landing_cli.reach.ellipsoid_arcs import arc_cuts_many, freeze_many, lowest_levels, lowest_levels_between
-from landing_cli.reach.free_batch import keep_costates, keep_pressure, no_cuts, solve_many
+from landing_cli.reach.free_batch import no_cuts, solve_many
 from landing_cli.reach.free_descent import PreparedCase, Surroundings, prepare, survey
-from landing_cli.reach.free_solve import FIRST_BLOCKED, LaneSolver, judge, linearise, new_solver, take_step
+from landing_cli.reach.free_solve import LaneSolver, linearise, new_solver, take_step
 from landing_cli.reach.records import LandingCase
+
+_typeof: Any = numba.typeof
 
 
 def are_compiled(descent: str, terrain: str = "report") -> bool:
@@ -66,7 +69,7 @@ def compile_parts(case: LandingCase) -> None:
     )
     prepared = prepare(case, shared)
     # gravity comes with the survey: where two begin together, the other does not need it
-    parts = [_conic, lambda _: survey(case), _flight, _delivery, _certificates, _answers, _ellipsoid_arcs]
+    parts = [_conic, lambda _: survey(case), _flight, _delivery, _certificates, _ellipsoid_arcs]
     if case.descent == "extremal":
         parts.insert(2, _extremals)
     if case.terrain == "require":
@@ -83,30 +86,30 @@ def _solver(prepared: PreparedCase) -> LaneSolver:
     return new_solver(prepared.coarse)
 
 
+def _compile(kernel: Any, *arguments: object) -> None:
+    """Compile a kernel that Python cannot call."""
+    kernel.compile(tuple(_typeof(argument) for argument in arguments))
+
+
 def _conic(prepared: PreparedCase) -> None:
     """Interior-point iterations."""
-    take_step(layout(prepared.coarse, 0, 1.0, False), _solver(prepared).lanes)
+    _compile(take_step, layout(prepared.coarse, 0, 1.0, False), _solver(prepared).lanes)
 
 
 def _certificates(prepared: PreparedCase) -> None:
     """Bounds that prove a facet unreachable."""
-    solver, case, residual = _solver(prepared), prepared.coarse, (0.0, 0.0, 1.0)
-    solver.iteration[0] = FIRST_BLOCKED
-    judge(case, layout(case, 0, 1.0, False), 0, residual, 0, prepared.coarse_tube, 1.0, 1, False, solver)
-
-
-def _answers(prepared: PreparedCase) -> None:
-    """What is kept of a solve's multipliers."""
-    solver, case = _solver(prepared).lanes, prepared.coarse
-    plan = layout(case, 0, 1.0, False)
-    keep_costates(case, plan, solver, 0, 0.0, np.zeros(7))
-    keep_pressure(case, plan, solver, 0, 0, np.zeros(6))
+    single, case, target = _solver(prepared).single, prepared.coarse, prepared.shared.normals[0]
+    point, model = single.point, single.model
+    linearised_thrust_level(case, layout(case, 0, 1.0, False), point, model, single.duals)
+    multipliers = point.multiplier, point.cone_dual, single.duals
+    certified_thrust_level(case, target, prepared.coarse_tube, 1.0, model, *multipliers, single.cuts, 0, 1.0)
 
 
 def _flight(prepared: PreparedCase) -> None:
     """The linearised flight, gravity and constraints."""
     solver = _solver(prepared).lanes
-    linearise(prepared.coarse, layout(prepared.coarse, 0, 1.0, False), solver)
+    plan = layout(prepared.coarse, 0, 1.0, False)
+    _compile(linearise, prepared.coarse, plan, solver)
 
 
 def _delivery(prepared: PreparedCase) -> None:

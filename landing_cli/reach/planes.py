@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
+from landing_cli.kernel import inner, kernel
 from landing_cli.kernel_lanes import any_lane, at_rows, choose
 from landing_cli.kernel_record import by_reference
 from landing_cli.optimize.conic_records import Model, New
@@ -55,7 +55,7 @@ def arc_weights(sigma: float, final_time: float) -> tuple[float, float, float, f
     )
 
 
-@kernel
+@inner
 def _retake(case: ScaledCase, path: Path, cuts: Cuts, c: int, which: bool) -> None:
     """Move a tangent plane to the current position of its node."""
     if not any_lane(which):
@@ -67,7 +67,7 @@ def _retake(case: ScaledCase, path: Path, cuts: Cuts, c: int, which: bool) -> No
     n[0], n[1], n[2] = choose(which, a, n[0]), choose(which, b, n[1]), choose(which, d, n[2])
 
 
-@kernel
+@inner
 def refresh_planes(
     case: ScaledCase,
     target: Floats,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.body.gravity.field import GravityKind
-from landing_cli.kernel import kernel
+from landing_cli.kernel import inner, kernel
 from landing_cli.kernel_lanes import choose
 from landing_cli.kernel_record import by_reference
 from landing_cli.reach.gravity_in_lanes import acceleration, acceleration_and_gradient
@@ -98,7 +98,7 @@ def scale_case(case: LandingCase, n_intervals: int) -> ScaledCase:
     )
 
 
-@kernel
+@inner
 def core_scale(case: ScaledCase, x: float, y: float, z: float) -> float:
     """Metres per unit of length, more where a body-frame point lies in the ellipsoid's core."""
     a, b, c = x * case.inverse_axes[0], y * case.inverse_axes[1], z * case.inverse_axes[2]
@@ -106,7 +106,7 @@ def core_scale(case: ScaledCase, x: float, y: float, z: float) -> float:
     return case.length_m * choose(level >= CORE * CORE, 1.0, CORE / math.sqrt(level + 1e-30))
 
 
-@kernel
+@inner
 def gravity_and_gradient(
     case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
@@ -137,7 +137,7 @@ def gravity_and_gradient(
     )
 
 
-@kernel
+@inner
 def gravity_in_space(
     case: ScaledCase, cosine: float, sine: float, x: float, y: float, z: float
 ) -> tuple[float, float, float]:
@@ -149,7 +149,7 @@ def gravity_in_space(
     return p * (cosine * ax - sine * ay), p * (sine * ax + cosine * ay), p * az
 
 
-@kernel
+@inner
 def gravity_on_arc(case: ScaledCase, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Gravity at a point of the final arc, scaled, body axes; arcs may fly deep in the ellipsoid."""
     L, p = case.length_m, 1.0 / case.acceleration_m_s2
@@ -166,13 +166,12 @@ def ellipsoid_level(case: ScaledCase, cosine: float, sine: float, x: float, y: f
     return math.sqrt(a * a + b * b + c * c)
 
 
-@kernel
+@inner
 def least_between(first: float, middle: float, last: float) -> float:
     """Least value of the parabola through three evenly spaced values, between the outer two."""
     slope, bend = 0.5 * (last - first), 0.5 * (first + last) - middle
-    if bend > 0.0 and abs(slope) < 2.0 * bend:
-        return middle - slope * slope / (4.0 * bend)
-    return min(first, middle, last)
+    dips = (bend > 0.0) & (abs(slope) < 2.0 * bend)
+    return choose(dips, middle - slope * slope / (4.0 * bend), min(min(first, middle), last))
 
 
 @kernel

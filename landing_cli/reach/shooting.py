@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel
-from landing_cli.kernel_lanes import any_lane, choose
+from landing_cli.kernel import inner, kernel
+from landing_cli.kernel_lanes import WIDTH, any_lane, choose, new_lanes, with_lane
 from landing_cli.kernel_record import by_reference
 from landing_cli.optimize.conic_records import New
 from landing_cli.reach.scaled_case import ScaledCase, gravity_and_gradient, gravity_in_space
@@ -155,9 +155,10 @@ def fly_accurately(case: ScaledCase, thrust: Floats, samples: Floats) -> None:
     n = thrust.shape[0]
     substeps = (samples.shape[0] - 1) // n
     h = 1.0 / (n * substeps)
-    x, y, z = case.position[0], case.position[1], case.position[2]
-    vx, vy, vz = case.velocity[0], case.velocity[1], case.velocity[2]
-    mass = 1.0
+    none = choose(thrust[0, 0] > 0.0, 0.0, 0.0)  # numbers that begin as lanes are compiled for lanes alone
+    x, y, z = none + case.position[0], none + case.position[1], none + case.position[2]
+    vx, vy, vz = none + case.velocity[0], none + case.velocity[1], none + case.velocity[2]
+    mass = none + 1.0
     _keep_sample(samples[0], x, y, z, vx, vy, vz, mass)
     # the body's angle at the start and at the middle and end of each step, turned on by half a step
     old_c, old_s = math.cos(case.spin), -math.sin(case.spin)
@@ -197,13 +198,41 @@ def fly_accurately(case: ScaledCase, thrust: Floats, samples: Floats) -> None:
             _keep_sample(samples[row], x, y, z, vx, vy, vz, mass)
 
 
-@kernel
+@inner
 def _keep_sample(
     sample: Floats, x: float, y: float, z: float, vx: float, vy: float, vz: float, mass: float
 ) -> None:
     """Fill one row of samples."""
     sample[0], sample[1], sample[2] = x, y, z
     sample[3], sample[4], sample[5], sample[6] = vx, vy, vz, mass
+
+
+@by_reference
+class Flights(NamedTuple):
+    """Accurate flights of as many facets as there are lanes."""
+
+    thrust: Floats  # (N, 3) scaled, solver axes
+    samples: Floats  # (steps + 1, 7)
+    cosine: NDArray[np.float64]  # (steps + 1,) of the body's angle at the samples, relative to the handover
+    sine: NDArray[np.float64]
+
+
+def new_flights(case: ScaledCase, substeps: int) -> Flights:
+    """Room for flights with so many Runge-Kutta steps in each interval of a case."""
+    n = len(case.mid_cos)
+    angle = case.spin * (np.arange(n * substeps + 1) / (n * substeps) - 1.0)
+    return Flights(new_lanes((n, 3)), new_lanes((n * substeps + 1, 7)), np.cos(angle), np.sin(angle))
+
+
+@inner
+def fly_some(case: ScaledCase, thrusts: Floats, first: int, flights: Flights) -> None:
+    """Fly (n, N, 3) thrusts from the first on accurately, one a lane; the last one fills what is left."""
+    for place in range(WIDTH):
+        i = min(first + place, thrusts.shape[0] - 1)
+        for k in range(thrusts.shape[1]):
+            for a in range(3):
+                flights.thrust[k, a] = with_lane(flights.thrust[k, a], place, thrusts[i, k, a])
+    fly_accurately(case, flights.thrust, flights.samples)
 
 
 @kernel
