@@ -35,5 +35,5 @@ def flops_of_iteration(intervals: int) -> float:
     node += 2 * (SHIFT + DIRECTION + 4 * 6 * ROWS / 2)
     cone = 4 * Y * 4 + SCALING + Y * 20 + 8 * Y * (Y + 1) / 2
     cone += 2 * (SHIFT + DIRECTION + 3 * 2 * 4 * Y)
-    dense = ROWS**3 / 3 + 2 * Y * ROWS**2 + Y * Y * ROWS + Y**3 / 3 + 2 * 2 * (ROWS**2 + Y**2 + 2 * ROWS * Y)
+    dense = ROWS**3 / 3 + Y * ROWS**2 + Y * Y * ROWS + Y**3 / 3 + 2 * 2 * (ROWS**2 + Y**2 + 2 * ROWS * Y)
     return intervals * node + CONES * cone + dense

@@ -2,8 +2,9 @@
 
 ``kernel`` is for what Python calls: cached on disk. ``part`` is for what only kernels call: it is typed and
 translated once, but optimised and made machine code with its callers alone, which takes a fifth off the first
-compilation. ``inlined`` spares a short function with one caller its translation too; long ones compile slower
-inlined.
+compilation. ``inner`` is for a large part that a process of its own compiles, for those that link it (see
+`reach.kernels`). ``inlined`` spares a short function with one caller its translation too; long ones compile
+slower inlined.
 
 A trap of numba's: a function is compiled again for each literal argument, also for a variable that begins as
 one (begin with ``np.int64(0)``).
@@ -117,4 +118,5 @@ _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 kernel = _njit(**_OPTIONS, cache=True, pipeline_class=_KernelCompiler)
 part = _njit(**_OPTIONS, no_cpython_wrapper=True, pipeline_class=_PartCompiler)
+inner = _njit(**_OPTIONS, cache=True, no_cpython_wrapper=True, pipeline_class=_KernelCompiler)
 inlined = _njit(**_OPTIONS, inline="always")

@@ -48,6 +48,21 @@ def by_reference(record: Class) -> Class:
     return record
 
 
+def always_alike(record: Class) -> Class:
+    """By reference, for a class whose records all hold the same types: they are looked up once."""
+    by_reference(record)
+    look_up = _extending.typeof_impl.dispatch(record)
+    known: list[RecordType] = []
+
+    @_extending.typeof_impl.register(record)
+    def typeof_alike(value: Any, context: Any) -> RecordType:
+        if not known:
+            known.append(look_up(value, context))
+        return known[0]
+
+    return record
+
+
 @_extending.register_model(RecordType)
 class _RecordModel(_PointerModel):  # type: ignore[misc]
     """A pointer to the fields, which lie in the frame of the call from Python."""

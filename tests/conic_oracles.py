@@ -39,9 +39,9 @@ def copy_of(point: Point) -> Point:
 
 def rows_on_thrust(model: Model) -> np.ndarray:
     """Derivatives of the rows by all thrust nodes, (R, 3 N), zero beyond a row's end."""
-    r, n, _ = model.row_thrust.shape
+    n = len(model.basis)
     within = np.arange(n)[None, :] < model.row_end[:, None]
-    return (model.row_thrust * within[:, :, None]).reshape(r, 3 * n)
+    return np.einsum("rb,kbi,rk->rki", model.row_mix, model.basis, within).reshape(-1, 3 * n)
 
 
 def spectral(x: np.ndarray, function) -> np.ndarray:
@@ -210,7 +210,7 @@ def iterate(point: Point, model: Model, sizes: Sizes, most: int = 80) -> tuple[f
     fixed = Model(*(a.copy() for a in model))
     start = copy_of(point)
     rows = rows_on_thrust(model)
-    step = new_step(sizes.nodes, sizes.cones, sizes.rows)
+    step = new_step(sizes.nodes, sizes.cones, sizes.rows, model.basis.shape[1])
     counts = sizes.equal, sizes.rows, sizes.cones
     taken = 0
     while True:

@@ -17,6 +17,8 @@ from landing_cli.optimize.conic_records import Model, Point, Step, new_model, ne
 
 fill_row_pull = from_python(fill_row_pull_part)
 
+BASIS = 11  # functionals that rows are mixed of: enough for rows that are independent of each other
+
 SIZES = {
     "energy": Sizes(6, 4, 6, 6, False),
     "margin": Sizes(6, 4, 6, 6, True),
@@ -36,7 +38,7 @@ def random_problem(sizes: Sizes, seed: int = 0) -> tuple[Point, Model]:
     """A convex problem at an interior point, nothing of it in balance, with rows of every reach."""
     rng = np.random.default_rng(seed)
     n, j, r = sizes.nodes, sizes.cones, sizes.rows
-    point, model = new_point(n, j, r), new_model(n, j, r)
+    point, model = new_point(n, j, r), new_model(n, j, r, BASIS)
     point.thrust[:] = rng.normal(size=(n, 3)) * 0.3
     point.node_dual[:] = cone_point(rng, (n,)) / n
     point.y[:] = rng.normal(size=7)
@@ -51,7 +53,10 @@ def random_problem(sizes: Sizes, seed: int = 0) -> tuple[Point, Model]:
     model.row_end[sizes.equal :] = rng.integers(1, n + 1, r - sizes.equal)
     if sizes.equal == 7:
         model.row_end[6] = 0
-    model.row_thrust[:] = rng.normal(size=(r, n, 3))  # beyond a row's end it must not be read
+    model.row_live[:] = 1.0
+    model.row_mix[:], model.basis[:] = rng.normal(size=(r, BASIS)), rng.normal(size=(n, BASIS, 3))
+    model.row_mix[:] = 0.2 * model.row_mix + np.eye(r, BASIS)
+    model.row_mix[:6] = np.eye(6, BASIS)
     model.cone_map[:], model.cone_offset[:] = rng.normal(size=(j, 4, 7)), rng.normal(size=(j, 4))
     model.thrust_gradient[:] = rng.normal(size=(n, 3)) / n
     model.thrust_curvature[:] = rng.uniform(0.5, 2.0, n) / n
@@ -64,7 +69,7 @@ def random_problem(sizes: Sizes, seed: int = 0) -> tuple[Point, Model]:
 
 def stepped(point: Point, model: Model, sizes: Sizes, least_target: float = 0.0) -> tuple[Step, float, float]:
     """Take one step in place; return the scratch space, the step's length and the gap before it."""
-    step = new_step(sizes.nodes, sizes.cones, sizes.rows)
+    step = new_step(sizes.nodes, sizes.cones, sizes.rows, BASIS)
     counts = sizes.equal, sizes.rows, sizes.cones
     _, _, gap = residuals(point, model, step, *counts, sizes.tau_free)
     return step, advance(point, model, step, *counts, gap, least_target, sizes.tau_free), gap
@@ -74,7 +79,7 @@ def stepped(point: Point, model: Model, sizes: Sizes, least_target: float = 0.0)
 def test_residuals_are_those_of_the_optimality_conditions(name: str) -> None:
     sizes = SIZES[name]
     point, model = random_problem(sizes)
-    dense, step = DenseNewton(point, model, sizes), new_step(sizes.nodes, sizes.cones, sizes.rows)
+    dense, step = DenseNewton(point, model, sizes), new_step(sizes.nodes, sizes.cones, sizes.rows, BASIS)
     primal, dual, gap = residuals(point, model, step, sizes.equal, sizes.rows, sizes.cones, sizes.tau_free)
     expected = dense.residuals()
     np.testing.assert_allclose(step.node_residual.ravel(), expected["F"], rtol=0, atol=1e-14)
@@ -174,5 +179,5 @@ def test_iterations_on_frozen_data_end_at_clarabels_optimum(name: str, seed: int
     assert objective == pytest.approx(truth.objective, abs=2e-7)
     for field in ("thrust", "y", "multiplier", "node_dual", "cone_dual"):
         np.testing.assert_allclose(
-            getattr(point, field), getattr(truth, field), rtol=0, atol=1e-4, err_msg=field
+            getattr(point, field), getattr(truth, field), rtol=0, atol=2e-4, err_msg=field
         )

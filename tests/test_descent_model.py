@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conic_oracles import rows_on_thrust
 from kernel_calls import from_python
 from landing_samples import asteroid, landing_case, some_thrust
 from scipy.integrate import quad
@@ -16,20 +17,20 @@ from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.optimize.conic_records import Model, Point, new_model, new_point
 from landing_cli.reach.descent_model import (
     Layout,
-    fill_arc_cones as fill_arc_cones_part,
+    fill_arc_cones,
     fill_glide_cones as fill_glide_cones_part,
     fill_handover_rows as fill_handover_rows_part,
     layout,
     refresh,
 )
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc as measure_arc_part
-from landing_cli.reach.planes import Cuts, arc_weights as arc_weights_part, new_cuts
+from landing_cli.reach.free_solve import basis_of
+from landing_cli.reach.planes import Cuts, arc_weights, new_cuts
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level as ellipsoid_level_part, scale_case
 from landing_cli.reach.shooting import Path, new_path
 
-arc_weights = from_python(arc_weights_part)
 ellipsoid_level = from_python(ellipsoid_level_part)
-fill_arc_cones = from_python(fill_arc_cones_part)
+
 fill_glide_cones = from_python(fill_glide_cones_part)
 fill_handover_rows = from_python(fill_handover_rows_part)
 measure_arc = from_python(measure_arc_part)
@@ -57,10 +58,10 @@ class Problem:
         self.target = self.target_m / self.scaled.length_m
         normal = self.target + 0.02 * rng.normal(size=3)
         self.normal = normal / np.linalg.norm(normal)
-        self.plan: Layout = layout(self.scaled, len(CUT_NODES), 0.7, True, 1.01, len(WALLS))
+        self.plan: Layout = layout(self.scaled, len(CUT_NODES) + len(WALLS), 0.7, True)
         sizes = N, self.plan.n_cones, self.plan.n_rows
         self.point: Point = new_point(*sizes)
-        self.model: Model = new_model(*sizes)
+        self.model: Model = new_model(*sizes, basis_of(self.scaled))
         self.path: Path = new_path(N)
         self.cuts: Cuts = new_cuts(N + 1)
         self.point.thrust[:] = some_thrust(N)
@@ -73,6 +74,7 @@ class Problem:
         for c in range(len(CUT_NODES)):
             self.cuts.node[c] = CUT_NODES[c]
             self.cuts.normal[c] = rng.normal(size=3)
+            self.cuts.tangent[c], self.cuts.offset[c] = 1.0, 1.01
         for c, (node, fraction) in enumerate(WALLS, len(CUT_NODES)):
             self.cuts.node[c], self.cuts.fraction[c] = node, fraction
             self.cuts.normal[c], self.cuts.offset[c] = rng.normal(size=3), WALL_OFFSET
@@ -108,6 +110,11 @@ class Problem:
         return by_thrust, by_y
 
 
+def by_thrust_of(model: Model) -> np.ndarray:
+    """Derivatives of the rows by thrust, (R, N, 3)."""
+    return rows_on_thrust(model).reshape(-1, N, 3)
+
+
 def test_the_arc_between_its_ends_has_the_acceleration_that_it_says() -> None:
     """Position and velocity of the weights, differentiated in time, give a*; both vanish at touchdown."""
     T, h = 0.37, 1e-4
@@ -123,9 +130,10 @@ def test_the_arc_between_its_ends_has_the_acceleration_that_it_says() -> None:
 def test_rows_have_the_derivatives_of_their_values(handover: str) -> None:
     p = Problem(mass_flow=0.0, handover=handover)
     by_thrust, by_y = p.differences()
-    flown = p.plan.n_rows - 1  # all but the propellant, which does not move without a mass flow
-    for r in range(flown):
-        derivative = p.model.row_thrust[r] * (np.arange(N) < p.model.row_end[r])[:, None]
+    for r in range(p.plan.n_rows):
+        if r == p.plan.first_plane - 1:
+            continue  # the propellant, which does not move without a mass flow
+        derivative = by_thrust_of(p.model)[r]
         scale = np.abs(by_thrust[r]).max() + 0.01
         # gravity is held within an interval: h^2/8 of its gradient
         np.testing.assert_allclose(derivative, by_thrust[r], rtol=0, atol=1e-4 * scale, err_msg=f"row {r}")
@@ -135,11 +143,11 @@ def test_rows_have_the_derivatives_of_their_values(handover: str) -> None:
 def test_the_propellant_row_has_the_derivatives_of_the_fuel_left() -> None:
     p = Problem()
     by_thrust, by_y = p.differences()
-    last = p.plan.n_rows - 1
+    last = p.plan.first_plane - 1
     assert p.model.row_value[last] == pytest.approx(p.scaled.propellant - (1 - touchdown_mass(p)), abs=1e-3)
     touch = np.abs(by_thrust[last]).max()
     # the mass at touchdown is exponential in the arc's thrust; the row takes the descent's share linearly
-    np.testing.assert_allclose(p.model.row_thrust[last], by_thrust[last], rtol=0, atol=0.01 * touch)
+    np.testing.assert_allclose(by_thrust_of(p.model)[last], by_thrust[last], rtol=0, atol=0.01 * touch)
     np.testing.assert_allclose(p.model.row_y[last], by_y[last], rtol=0, atol=0.05 * np.abs(by_y[last]).max())
 
 
@@ -250,7 +258,7 @@ def test_planes_touch_the_ellipsoid_at_their_node_when_they_are_retaken() -> Non
     for c, k in enumerate(CUT_NODES):
         n, x = p.cuts.normal[c], p.path.position[k]
         level = ellipsoid_level(p.scaled, p.scaled.node_cos[k], p.scaled.node_sin[k], *x)
-        assert p.model.row_value[p.plan.n_equal + c] == pytest.approx(level - 1.01, abs=1e-14)
+        assert p.model.row_value[p.plan.first_plane + c] == pytest.approx(level - 1.01, abs=1e-14)
         # a tangent plane of the unit sphere in xi: no point of the plane is inside the ellipsoid
         rng = np.random.default_rng(k)
         for point in rng.normal(size=(50, 3)):
@@ -263,7 +271,7 @@ def test_planes_touch_the_ellipsoid_at_their_node_when_they_are_retaken() -> Non
 
 def test_a_wall_holds_at_its_node_or_at_its_point_of_the_final_arc() -> None:
     p = Problem()
-    first = p.plan.n_equal + len(CUT_NODES)
+    first = p.plan.first_plane + len(CUT_NODES)
     T, e, s = p.scaled.final_time, p.point.y[1:4], p.point.y[4:7]
     node, fraction = WALLS[0][0], WALLS[1][1]
     togo = fraction * T
@@ -352,6 +360,6 @@ def test_energy_is_that_of_the_two_stages() -> None:
 
 def test_layout_counts_the_rows_that_are_filled() -> None:
     p = Problem(handover="on_ellipsoid")
-    assert (p.plan.n_equal, p.plan.n_cuts, p.plan.n_walls, p.plan.n_rows) == (7, 3, 2, 14)
+    assert (p.plan.n_equal, p.plan.first_plane, p.plan.n_rows) == (7, 9, 14)
     assert p.plan.n_cones == len(p.scaled.arc_fractions) + 2
-    assert p.model.row_end.tolist() == [N] * 6 + [0, *CUT_NODES, 5, 0, 0, N]
+    assert p.model.row_end.tolist() == [N] * 6 + [0, 0, N, *CUT_NODES, 5, 0]

@@ -10,7 +10,7 @@ from landing_cli.reach.ellipsoid_arcs import (
     freeze_on_path,
     last_cut_node as last_cut_node_part,
     lowest_level,
-    lowest_level_between,
+    lowest_levels_between,
 )
 from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import (
@@ -98,12 +98,11 @@ def test_between_the_nodes_the_level_is_that_of_a_dense_flight() -> None:
         aim = np.cross(scaled.position, [0.0, 0.0, 1.0]) * depth - scaled.position
         thrust[: N // 2] = 0.9 * aim / np.linalg.norm(aim)
         thrust[N // 2 :] = 0.95 * scaled.position / np.linalg.norm(scaled.position)
-        samples, dense = np.zeros((SUBSTEPS * N + 1, 7)), np.zeros((40 * N + 1, 7))
+        dense, found = np.zeros((40 * N + 1, 7)), np.zeros(1)
         fly_accurately(scaled, thrust, dense)
         levels = [np.linalg.norm(xi_of(case, scaled, t, x)) for t, x in zip(times, dense[:, :3], strict=True)]
-        found = lowest_level_between(scaled, thrust, samples)
-        assert found == pytest.approx(min(levels), abs=2e-5)
-        np.testing.assert_allclose(samples, dense[:: 40 // SUBSTEPS], rtol=0, atol=1e-9)
+        lowest_levels_between(scaled, thrust[None], found)
+        assert found[0] == pytest.approx(min(levels), abs=2e-5)
         between += min(levels) < min(levels[:: 40 // SUBSTEPS]) - 1e-4
     assert between >= 2
 

@@ -10,31 +10,28 @@ from landing_samples import landing_case
 
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.flight.spacecraft import Spacecraft
-from landing_cli.optimize.conic_records import Model, Point, new_model, new_point, new_step
+from landing_cli.optimize.conic_records import Model, Point
 from landing_cli.reach.descent_model import Layout, layout, refresh
-from landing_cli.reach.free_solve import Solver, cold_start
-from landing_cli.reach.planes import new_cuts
+from landing_cli.reach.free_solve import Solver, basis_of, cold_start, fill_constants, new_solver_of
 from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal as ellipsoid_normal_part, scale_case
-from landing_cli.reach.shooting import new_path
+from landing_cli.reach.shooting import fly as fly_part
 
 ellipsoid_normal = from_python(ellipsoid_normal_part)
+fly = from_python(fly_part)
 
 INTERVALS = 12
 WALL_AHEAD = 0.01
 
 
-def solver_of(scaled: ScaledCase, plan: Layout) -> Solver:
-    """A solver with room for exactly this problem."""
-    sizes = INTERVALS, plan.n_cones, plan.n_rows
-    return Solver(
-        new_point(*sizes),
-        new_model(*sizes),
-        new_step(*sizes),
-        new_path(INTERVALS),
-        new_cuts(INTERVALS + 1),
-        np.zeros((plan.n_cones, 4)),
-    )
+def solver_of(scaled: ScaledCase, plan: Layout, target: np.ndarray, normal: np.ndarray) -> Solver:
+    """A solver with room for exactly this problem, not yet with its planes."""
+    solver = new_solver_of(INTERVALS, plan.n_cones, plan.n_rows, INTERVALS + 1, basis_of(scaled))
+    solver.target[:], solver.normal[:], solver.model.row_live[:] = target, normal, 1.0
+    fly(scaled, solver.point.thrust, solver.path)
+    solver.drift[:3], solver.drift[3:] = solver.path.position[-1], solver.path.velocity[-1]
+    fill_constants(scaled, solver)
+    return solver
 
 
 def frozen(
@@ -49,17 +46,19 @@ def frozen(
     scaled = scale_case(case, INTERVALS)
     centroids, normals = facet_centroids(mesh), facet_normals(mesh)
     facet = int(np.argmin(np.abs(normals @ case.position_m / np.linalg.norm(case.position_m) + 0.3)))
-    plan = layout(scaled, len(cut_nodes), 1e-3 if tau_free else 1.0, tau_free, level, len(walls))
-    solver = solver_of(scaled, plan)
+    plan = layout(scaled, len(cut_nodes) + len(walls), 1e-3 if tau_free else 1.0, tau_free)
     target = centroids[facet] / scaled.length_m
+    solver = solver_of(scaled, plan, target, normals[facet])
     if cut_nodes:
         # planes under a straight way to the handover, so that some of them are in the way
-        cold_start(scaled, target, normals[facet], plan, solver)
+        cold_start(scaled, plan, True, solver)
+        fly(scaled, solver.point.thrust, solver.path)
         for c, k in enumerate(cut_nodes):
             x = solver.path.position[k]
-            solver.cuts.node[c] = k
+            solver.cuts.node[c], solver.cuts.offset[c], solver.cuts.tangent[c] = k, level, 1.0
             solver.cuts.normal[c] = ellipsoid_normal(scaled, scaled.node_cos[k], scaled.node_sin[k], *x)
-    cold_start(scaled, target, normals[facet], plan, solver)
+    cold_start(scaled, plan, True, solver)
+    fly(scaled, solver.point.thrust, solver.path)
     for c, (node, fraction) in enumerate(walls, len(cut_nodes)):
         # a little to one side of where it would fly
         x = solver.path.position[node] if node else target

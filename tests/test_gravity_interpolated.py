@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gravity_helpers import POTATO, points_around
+from kernel_calls import from_python
 
 from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.field_values import (
@@ -14,12 +15,14 @@ from landing_cli.body.gravity.field_values import (
     potentials,
 )
 from landing_cli.body.gravity.interpolated import Box, InterpolatedField, interpolated_field
-from landing_cli.body.gravity.kernels import curvature
+from landing_cli.body.gravity.kernels import curvature as curvature_part
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.body.gravity.polyhedron import polyhedron_field
 from landing_cli.body.gravity.triangle_boxes import triangles_in_box
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.errors import InputRefused
+
+curvature = from_python(curvature_part)
 
 EXACT = polyhedron_field(POTATO.vertices, POTATO.faces, 5.0)
 FACET = int(np.argmax(facet_centroids(POTATO) @ np.array([0.3, 0.5, 0.8])))

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gravity_helpers import FIELDS, POTATO, points_around
+from kernel_calls import from_python
 
 from landing_cli.body.gravity import surrounding, surrounding_kernels
 from landing_cli.body.gravity.bounds import FIT_MARGIN, largest_acceleration_on_ellipsoid
@@ -20,7 +21,7 @@ from landing_cli.body.gravity.field_values import (
     potentials,
 )
 from landing_cli.body.gravity.kernel_types import FloatArray
-from landing_cli.body.gravity.kernels import curvature
+from landing_cli.body.gravity.kernels import curvature as curvature_part
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.body.gravity.polyhedron import polyhedron_field
 from landing_cli.body.gravity.surface_bound import largest_acceleration_on_mesh
@@ -31,6 +32,8 @@ from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.errors import InputRefused
 from landing_cli.kernel import kernel
 from landing_cli.sources import kept_interpolation as kept
+
+curvature = from_python(curvature_part)
 
 EXACT = FIELDS["polyhedron"]
 TABLE = Body.of(EXACT).table

@@ -65,7 +65,7 @@ def test_one_scaling_takes_the_dual_and_the_slack_to_the_same_point(gap_s: float
     for s, z in pairs(gap_s, gap_z):
         w, beta, v = scaled(s, z)
         by_dual = np.array(apply_scaling(*v, beta, *z))
-        by_slack = np.array(apply_inverse_scaling(*v, beta, *s))
+        by_slack = np.array(apply_inverse_scaling(*v, 1.0 / beta, *s))
         np.testing.assert_allclose(by_dual, by_slack, rtol=0, atol=1e-14 * blow_up(gap_s, gap_z) * by_dual[0])
         assert by_dual @ by_dual == pytest.approx(s @ z, rel=1e-14 * blow_up(gap_s, gap_z))
         assert abs(w @ J @ w - 1.0) < 1e-14 * blow_up(gap_s, gap_z) * (w @ w)
@@ -77,7 +77,7 @@ def test_the_scaling_is_symmetric_and_is_the_matrix_of_its_definition() -> None:
         W = as_matrix(apply_scaling, *v, beta)
         np.testing.assert_allclose(W, beta * (2 * np.outer(v, v) - J), rtol=1e-13, atol=1e-13 * beta)
         np.testing.assert_allclose(W @ z, np.linalg.solve(W, s), rtol=1e-11)
-        inverse = as_matrix(apply_inverse_scaling, *v, beta)
+        inverse = as_matrix(apply_inverse_scaling, *v, 1.0 / beta)
         np.testing.assert_allclose(inverse @ W, np.eye(4), rtol=0, atol=1e-12 * (w @ w))
 
 
@@ -85,7 +85,7 @@ def test_the_scaling_is_symmetric_and_is_the_matrix_of_its_definition() -> None:
 def test_the_inverse_squared_scaling_takes_the_slack_to_the_dual(gap: float) -> None:
     for s, z in pairs(gap, gap):
         w, beta, v = scaled(s, z)
-        inverse = as_matrix(apply_inverse_scaling, *v, beta)
+        inverse = as_matrix(apply_inverse_scaling, *v, 1.0 / beta)
         squared = as_matrix(apply_inverse_scaling_squared, *w, beta**-2)
         np.testing.assert_allclose(
             squared, inverse @ inverse, rtol=0, atol=1e-14 * blow_up(gap) * np.abs(squared).max()

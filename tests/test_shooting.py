@@ -13,12 +13,14 @@ from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, scale_case
 from landing_cli.reach.shooting import (
     Path,
-    fly,
+    fly as fly_part,
     fly_accurately as fly_accurately_part,
     measure_defect as measure_defect_part,
     new_path,
     pull_back as pull_back_part,
 )
+
+fly = from_python(fly_part)
 
 fly_accurately = from_python(fly_accurately_part)
 measure_defect = from_python(measure_defect_part)
@@ -133,7 +135,7 @@ def test_the_defect_makes_the_simple_flight_end_where_the_accurate_one_does() ->
     scaled, thrust = scale_case(strong_case(), 10), some_thrust(10)
     path = new_path(10)
     path.defect[:] = 7.0  # of an earlier flight
-    measure_defect(scaled, thrust, path)
+    measure_defect(scaled, thrust, path, True)
     raw = flown(scaled, thrust)
     assert np.linalg.norm(path.defect) > 1e-6
     fly(scaled, thrust, path)
@@ -147,18 +149,23 @@ def test_the_defect_makes_the_simple_flight_end_where_the_accurate_one_does() ->
 PULL_TOLERANCE = 5e-5
 
 
-@pytest.mark.parametrize("end", [1, 7, 20])
-def test_pulled_back_weights_are_derivatives_of_the_flight(end: int) -> None:
-    rng = np.random.default_rng(end)
+def pulled_back(path: Path, p: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of p . r + q . v at the end by the intervals' thrust, and by the state at the start."""
+    basis, weights = np.zeros((len(path.gradient), 6, 3)), np.concatenate([p, q])
+    pull_back(path, basis)
+    return np.einsum("b,kbi->ki", weights, basis), weights @ path.to_start
+
+
+def test_pulled_back_weights_are_derivatives_of_the_flight() -> None:
+    rng = np.random.default_rng(20)
     scaled, thrust = scale_case(strong_case(), 20)._replace(mass_flow=0.0), some_thrust(20)
     p, q = rng.normal(size=3), rng.normal(size=3)
 
     def value(forces: np.ndarray, at: ScaledCase = scaled) -> float:
         path = flown(at, forces)
-        return float(p @ path.position[end] + q @ path.velocity[end])
+        return float(p @ path.position[-1] + q @ path.velocity[-1])
 
-    row = np.full((20, 3), 9.0)
-    back = np.array(pull_back(flown(scaled, thrust), end, *p, *q, row))
+    row, back = pulled_back(flown(scaled, thrust), p, q)
     step = 1e-5
     for k in range(20):
         for i in range(3):
@@ -166,11 +173,7 @@ def test_pulled_back_weights_are_derivatives_of_the_flight(end: int) -> None:
             up[k, i] += step
             down[k, i] -= step
             slope = (value(up) - value(down)) / (2 * step)
-            if k < end:
-                assert row[k, i] == pytest.approx(slope, abs=PULL_TOLERANCE * np.abs(row[:end]).max())
-            else:
-                assert slope == 0.0
-                assert row[k, i] == 9.0  # left alone
+            assert row[k, i] == pytest.approx(slope, abs=PULL_TOLERANCE * np.abs(row).max())
     for i in range(6):
         shift = step * np.eye(6)[i]
         up = scaled._replace(position=scaled.position + shift[:3], velocity=scaled.velocity + shift[3:])
@@ -179,12 +182,32 @@ def test_pulled_back_weights_are_derivatives_of_the_flight(end: int) -> None:
         assert back[i] == pytest.approx(slope, abs=PULL_TOLERANCE * np.abs(back).max())
 
 
+@pytest.mark.parametrize("node", [1, 7, 20])
+def test_levers_are_derivatives_of_the_end_by_a_kick_at_a_node(node: int) -> None:
+    scaled, thrust = scale_case(strong_case(), 20)._replace(mass_flow=0.0), some_thrust(20)
+    path, basis = flown(scaled, thrust), np.zeros((20, 6, 3))
+    pull_back(path, basis)
+
+    def end(forces: np.ndarray) -> np.ndarray:
+        path = flown(scaled, forces)
+        return np.concatenate([path.position[-1], path.velocity[-1]])
+
+    # a kick at a node is the mean of a push before it and one after it, less what the two do to each other
+    step, lever = 1e-5, path.lever[node].reshape(6, 3)
+    for i in range(3):
+        push = np.zeros((20, 3))
+        push[node - 1 : node + 1, i] = 0.5 * step * 20 if node < 20 else step * 20
+        slope = (end(thrust + push) - end(thrust - push)) / (2 * step)
+        late = 0.0 if node < 20 else 0.5 / 20 * np.eye(6)[i]  # the last push is made half an interval early
+        np.testing.assert_allclose(slope - late, lever[:, i], rtol=0, atol=3e-3 * np.abs(lever).max())
+
+
 def test_pulled_back_weights_become_exact_as_intervals_shrink() -> None:
     errors = []
     for n in (10, 20, 40):
         scaled, thrust = scale_case(strong_case(), n)._replace(mass_flow=0.0), some_thrust(n)
-        row, step = np.zeros((n, 3)), np.zeros((n, 3))
-        pull_back(flown(scaled, thrust), n, 1.0, 0.3, -0.5, 0.2, 0.7, -0.4, row)
+        step = np.zeros((n, 3))
+        row, _ = pulled_back(flown(scaled, thrust), np.array([1.0, 0.3, -0.5]), np.array([0.2, 0.7, -0.4]))
         step[:, 1] = 1e-5
 
         def value(forces: np.ndarray, at: ScaledCase = scaled) -> float:
@@ -198,7 +221,7 @@ def test_pulled_back_weights_become_exact_as_intervals_shrink() -> None:
 
 def test_pulling_back_through_a_thinning_mass_divides_by_the_mean_mass() -> None:
     scaled, thrust = without_gravity(scale_case(strong_case(), 10)), some_thrust(10)
-    path, row = flown(scaled, thrust), np.zeros((10, 3))
-    pull_back(path, 10, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, row)
+    path = flown(scaled, thrust)
+    row, _ = pulled_back(path, np.zeros(3), np.array([0.0, 1.0, 0.0]))
     np.testing.assert_allclose(row[:, 1], 0.1 / (0.5 * (path.mass[1:] + path.mass[:-1])), rtol=1e-14)
     np.testing.assert_array_equal(row[:, [0, 2]], 0.0)

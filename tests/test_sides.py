@@ -111,7 +111,7 @@ def test_no_multipliers_of_planes_prove_more_than_a_flight_that_keeps_to_them_ne
             angle = scaled.node_cos[k], scaled.node_sin[k]
             x = flights.position[f, k]
             normal[c] = np.array(ellipsoid_normal(scaled, *angle, *x)) / ellipsoid_level(scaled, *angle, *x)
-        cuts = Cuts(node.astype(np.int64), normal, np.zeros(3), np.zeros(3))
+        cuts = Cuts(node.astype(np.float64), normal, np.zeros(3), np.ones(3), np.ones(3))
         arc = p.shared.bounds.on_arcs_m_s2 / scaled.acceleration_m_s2
         target = p.shared.centroids_m[facet] / scaled.length_m
         for _ in range(200):

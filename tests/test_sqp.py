@@ -13,8 +13,10 @@ from landing_cli.optimize.sqp import (
     convexify as convexify_part,
     new_local_model as new_local_model_part,
     propose as propose_part,
-    violation,
+    violation as violation_part,
 )
+
+violation = from_python(violation_part)
 
 add_secant = from_python(add_secant_part)
 convexify = from_python(convexify_part)

@@ -174,6 +174,12 @@ def path_clearance(
     for k in range(last, -1, -1):
         j = min(k + 1, last)  # the chord from point j back to point k
         dx, dy, dz = path[k, 0] - path[j, 0], path[k, 1] - path[j, 1], path[k, 2] - path[j, 2]
+        slack = known - least
+        if slack > 0.0:  # a chord whose ends are this near to where the distance is known has no nearer point
+            x, y, z = path[j, 0] - kx, path[j, 1] - ky, path[j, 2] - kz
+            within = x * x + y * y + z * z <= slack * slack
+            if within and (x + dx) ** 2 + (y + dy) ** 2 + (z + dz) ** 2 <= slack * slack:
+                continue
         parts = max(1, int(np.ceil(np.sqrt(dx * dx + dy * dy + dz * dz) / spacing)))
         for i in range(1, parts + 1):
             back = (parts - i) / parts

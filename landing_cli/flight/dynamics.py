@@ -106,7 +106,7 @@ def rk4_step(
     out[6] = m + h * dm
 
 
-@kernel
+@part
 def turn(angle: float, vector: FloatArray, out: FloatArray) -> None:
     """Write a vector turned about +z by an angle (rad) into ``out``."""
     c, s = math.cos(angle), math.sin(angle)

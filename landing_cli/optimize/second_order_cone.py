@@ -6,7 +6,8 @@ for interior s and z there is one scaling W with W z = W^-1 s = lambda. With the
 
     W = beta (2 v v' - J),    W^-2 = beta^-2 (2 (J w)(J w)' - J).
 
-Cones are passed as four numbers: they stay in registers and nothing is allocated.
+Cones are passed as four numbers, or as four lanes (`kernel_lanes`): they stay in registers and nothing is
+allocated.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.kernel import part
+from landing_cli.kernel_lanes import choose
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +46,7 @@ def scaling_point(
         (s1 * p - z1 * q) * half,
         (s2 * p - z2 * q) * half,
         (s3 * p - z3 * q) * half,
-        z_norm / s_norm,
+        z_norm * p,
     )
 
 
@@ -59,16 +61,23 @@ def apply_scaling(
 
 @part
 def apply_inverse_scaling(
-    v0: float, v1: float, v2: float, v3: float, beta: float, x0: float, x1: float, x2: float, x3: float
+    v0: float,
+    v1: float,
+    v2: float,
+    v3: float,
+    inverse_beta: float,
+    x0: float,
+    x1: float,
+    x2: float,
+    x3: float,
 ) -> tuple[float, float, float, float]:
     """W^-1 x for v = (w + e) / sqrt(2 (w0 + 1))."""
     t = 2.0 * (v0 * x0 - v1 * x1 - v2 * x2 - v3 * x3)
-    inverse = 1.0 / beta
     return (
-        inverse * (t * v0 - x0),
-        inverse * (x1 - t * v1),
-        inverse * (x2 - t * v2),
-        inverse * (x3 - t * v3),
+        inverse_beta * (t * v0 - x0),
+        inverse_beta * (x1 - t * v1),
+        inverse_beta * (x2 - t * v2),
+        inverse_beta * (x3 - t * v3),
     )
 
 
@@ -121,15 +130,15 @@ def complementarity_shift(
     -------
     o0, o1, o2, o3 : float
     """
-    beta = 1.0 / math.sqrt(inverse_beta2)
-    scale = 1.0 / math.sqrt(2.0 * (w[0] + 1.0))
+    inverse_beta = math.sqrt(inverse_beta2)
+    beta, scale = 1.0 / inverse_beta, 1.0 / math.sqrt(2.0 * (w[0] + 1.0))
     v0, v1, v2, v3 = (w[0] + 1.0) * scale, w[1] * scale, w[2] * scale, w[3] * scale
     l0, l1, l2, l3 = apply_scaling(v0, v1, v2, v3, beta, z[0], z[1], z[2], z[3])
     q0, q1, q2, q3 = apply_scaling(
         v0, v1, v2, v3, beta, affine_dz[0], affine_dz[1], affine_dz[2], affine_dz[3]
     )
     p0, p1, p2, p3 = apply_inverse_scaling(
-        v0, v1, v2, v3, beta, affine_ds[0], affine_ds[1], affine_ds[2], affine_ds[3]
+        v0, v1, v2, v3, inverse_beta, affine_ds[0], affine_ds[1], affine_ds[2], affine_ds[3]
     )
     r0 = target - (l0 * l0 + l1 * l1 + l2 * l2 + l3 * l3) - (p0 * q0 + p1 * q1 + p2 * q2 + p3 * q3)
     r1 = -2.0 * l0 * l1 - p0 * q1 - q0 * p1
@@ -138,8 +147,9 @@ def complementarity_shift(
     # x with lambda o x = r
     determinant = max(l0 * l0 - l1 * l1 - l2 * l2 - l3 * l3, TINY)
     x0 = (l0 * r0 - l1 * r1 - l2 * r2 - l3 * r3) / determinant
-    x1, x2, x3 = (r1 - x0 * l1) / l0, (r2 - x0 * l2) / l0, (r3 - x0 * l3) / l0
-    return apply_inverse_scaling(v0, v1, v2, v3, beta, x0, x1, x2, x3)
+    shrink = 1.0 / l0
+    x1, x2, x3 = shrink * (r1 - x0 * l1), shrink * (r2 - x0 * l2), shrink * (r3 - x0 * l3)
+    return apply_inverse_scaling(v0, v1, v2, v3, inverse_beta, x0, x1, x2, x3)
 
 
 @part
@@ -150,15 +160,9 @@ def longest_step(
     a = d0 * d0 - d1 * d1 - d2 * d2 - d3 * d3
     b = s0 * d0 - s1 * d1 - s2 * d2 - s3 * d3
     c = s0 * s0 - s1 * s1 - s2 * s2 - s3 * s3
-    t = UNBOUNDED
     discriminant = b * b - a * c
-    if discriminant >= 0.0:
-        root = math.sqrt(discriminant)
-        if b <= 0.0:
-            if root - b > 0.0:
-                t = c / (root - b)
-        elif a < 0.0:
-            t = (-b - root) / a
-    if d0 < 0.0:
-        t = min(t, -s0 / d0)
-    return t
+    root = math.sqrt(max(discriminant, 0.0))
+    # the first root t of a t^2 + 2 b t + c, in the form that does not cancel
+    above, below = choose(b <= 0.0, c, b + root), choose(b <= 0.0, root - b, -a)
+    t = choose((discriminant >= 0.0) & (below > 0.0), above / below, UNBOUNDED)
+    return min(t, choose(d0 < 0.0, -s0 / d0, UNBOUNDED))

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import inlined, kernel, part
+from landing_cli.kernel import inlined, part
 from landing_cli.optimize.elastic_qp import new_elastic_qp, solve_elastic_qp
 
 Floats = NDArray[np.float64]
@@ -51,7 +51,7 @@ def new_local_model(n: int, m: int) -> LocalModel:
     )
 
 
-@kernel
+@part
 def violation(values: Floats, equality: NDArray[np.bool_], pooled: NDArray[np.bool_], m: int) -> float:
     """Violation of the first ``m`` rows: the sum of the rows' own, and the worst of the pool."""
     total, worst = 0.0, 0.0

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration_and_gradient, curvature
 from landing_cli.flight.extremal import ExtremalScale, rates_in_gravity, thrust_ratio
-from landing_cli.kernel import inlined, kernel, part
+from landing_cli.kernel import inlined, part
 
 Floats = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def gravity_point(field: Field, y: Floats) -> tuple[float, float, float]:
     return scale * y[0], scale * y[1], scale * y[2]
 
 
-@kernel
+@part
 def _rates(field: Field, saturated: bool, y: Floats, out: Floats) -> None:
     """Rates of state, costates and energy."""
     x, yy, z = gravity_point(field, y)

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import path_clearance
 from landing_cli.kernel import inlined, kernel, part
+from landing_cli.kernel_lanes import WIDTH, lane
 from landing_cli.kernel_record import by_reference
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
 from landing_cli.reach.scaled_case import ScaledCase, least_between
-from landing_cli.reach.shooting import fly_accurately
+from landing_cli.reach.shooting import Flights, fly_some, new_flights
 
 Floats = NDArray[np.float64]
 
@@ -75,16 +76,13 @@ def new_deliveries(size: int) -> Deliveries:
 
 
 @part
-def _to_body(case: ScaledCase, samples: Floats, path_m: Floats) -> float:
-    """Fill body-frame positions, m; return the least r' Re r - 1 of the descent."""
-    steps = samples.shape[0] - 1
+def _to_body(case: ScaledCase, flights: Flights, place: int, path_m: Floats) -> float:
+    """Fill body-frame positions of a lane, m; return the least r' Re r - 1 of the descent."""
     least, before, middle = 1e9, 1e9, 1e9
-    for row in range(steps + 1):
-        angle = case.spin * (row / steps - 1.0)
-        c, s = math.cos(angle), math.sin(angle)
-        x = c * samples[row, 0] + s * samples[row, 1]
-        y = c * samples[row, 1] - s * samples[row, 0]
-        z = samples[row, 2]
+    for row in range(flights.samples.shape[0]):
+        c, s, sample = flights.cosine[row], flights.sine[row], flights.samples[row]
+        at_x, at_y, z = lane(sample[0], place), lane(sample[1], place), lane(sample[2], place)
+        x, y = c * at_x + s * at_y, c * at_y - s * at_x
         path_m[row, 0], path_m[row, 1], path_m[row, 2] = (
             x * case.length_m,
             y * case.length_m,
@@ -109,12 +107,13 @@ def deliver(
     thrust: Floats,
     target_m: Floats,
     normal: Floats,
-    samples: Floats,
+    flights: Flights,
+    place: int,
     path_m: Floats,
     values: Floats,
     handover: Floats,
 ) -> None:
-    """Fly one facet's stored thrust and measure it.
+    """Measure the flight of one facet's stored thrust.
 
     Parameters
     ----------
@@ -124,17 +123,19 @@ def deliver(
         Scaled thrust, constant within each interval, solver axes.
     target_m, normal : (3,) float
         Touchdown point (m) and outward normal, body axes.
-    samples : (N DELIVERY_SUBSTEPS + 1, 7) float
-        Scratch space.
+    flights : Flights
+        Flown with that thrust,
+    place : int
+        in this lane.
     path_m : (N DELIVERY_SUBSTEPS + 1 + ARC_SAMPLES, 3) float
         Filled with the path from start to touchdown, body frame, m.
     values, handover : (10,) float, (7,) float
         Filled; see Deliveries.
     """
-    n, steps = thrust.shape[0], samples.shape[0] - 1
-    fly_accurately(case, thrust, samples)
-    margin = _to_body(case, samples, path_m)
-    end = samples[steps]
+    n, steps = thrust.shape[0], flights.samples.shape[0] - 1
+    margin, end = _to_body(case, flights, place, path_m), np.empty(7)
+    for i in range(7):
+        end[i] = lane(flights.samples[steps, i], place)
     speed = case.length_m / frame.descent_s
     for i in range(3):
         handover[i] = end[i] * case.length_m
@@ -186,7 +187,6 @@ def deliver(
     values[9] = excess if excess > LIMIT_TOLERANCE else 0.0
 
 
-@kernel
 def deliver_many(
     case: ScaledCase,
     frame: Frame,
@@ -197,18 +197,37 @@ def deliver_many(
     out: Deliveries,
 ) -> None:
     """Deliver a batch of facets; see :func:`deliver`."""
-    steps = thrusts.shape[1] * DELIVERY_SUBSTEPS + 1
-    samples, path_m = np.empty((steps, 7)), np.empty((steps + ARC_SAMPLES, 3))
-    for i in range(thrusts.shape[0]):
-        deliver(
-            case,
-            frame,
-            surface,
-            thrusts[i],
-            targets_m[i],
-            normals[i],
-            samples,
-            path_m,
-            out.values[i],
-            out.handover[i],
-        )
+    flights = new_flights(case, DELIVERY_SUBSTEPS)
+    fill_deliveries(case, frame, surface, thrusts, targets_m, normals, flights, out)
+
+
+@kernel
+def fill_deliveries(
+    case: ScaledCase,
+    frame: Frame,
+    surface: SurfaceIndex,
+    thrusts: Floats,
+    targets_m: Floats,
+    normals: Floats,
+    flights: Flights,
+    out: Deliveries,
+) -> None:
+    """Deliver a batch of facets, as many together as there are lanes; see :func:`deliver`."""
+    path_m = np.empty((flights.samples.shape[0] + ARC_SAMPLES, 3))
+    for first in range(0, thrusts.shape[0], WIDTH):
+        fly_some(case, thrusts, first, flights)
+        for place in range(min(WIDTH, thrusts.shape[0] - first)):
+            i = first + place
+            deliver(
+                case,
+                frame,
+                surface,
+                thrusts[i],
+                targets_m[i],
+                normals[i],
+                flights,
+                place,
+                path_m,
+                out.values[i],
+                out.handover[i],
+            )

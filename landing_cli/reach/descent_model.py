@@ -10,8 +10,8 @@ so that at s = sigma T
     v       = -T [ (sigma - sigma^2 / 2) a_e + sigma^2 / 2 a_s ]        (rotating frame).
 
 Rows: position and velocity match at the handover (6); the handover on the ellipsoid, in that reading (1);
-tangent planes of the ellipsoid at chosen nodes, planes off the terrain at nodes and points of the final arc,
-the handover reached from outside (in that reading) and the propellant bound (inequalities). Cones on y: the
+the handover reached from outside (in that reading), the propellant bound, tangent planes of the ellipsoid at
+chosen nodes, planes off the terrain at nodes and points of the final arc (inequalities). Cones on y: the
 final stage's thrust at a few points of the arc, and the glide slope at both ends of the arc: r - r_c is
 s^2 times an affine function of s, so both ends inside the convex cone mean the whole arc inside.
 """
@@ -24,7 +24,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import kernel, part
+from landing_cli.kernel import inlined, kernel, part
+from landing_cli.kernel_lanes import choose
 from landing_cli.optimize.conic_ipm import fill_row_pull
 from landing_cli.optimize.conic_records import Model, Point
 from landing_cli.reach.planes import Cuts, arc_weights, refresh_planes
@@ -41,38 +42,40 @@ COAST = 5e-3
 
 
 class Layout(NamedTuple):
-    """How many rows and cones a facet's problem has, and what it minimises."""
+    """How many rows and cones a facet's problem has, and what it minimises.
+
+    Rows: those of the matching, of the handover on the ellipsoid, of the approach to it, of the propellant,
+    where the case has them, then the planes.
+    """
 
     n_equal: int  # equality rows
-    n_cuts: int
+    first_plane: int
     n_rows: int
     n_cones: int
     energy_weight: float  # weight rho of J in the objective
     tau_free: bool  # minimise tau + rho J instead of rho J at tau = 1
-    level: float  # |xi| that the cuts keep (1 plus a margin for the path between nodes)
-    n_walls: int  # planes off the terrain, after the cuts
 
 
 @kernel
-def layout(
-    case: ScaledCase, n_cuts: int, energy_weight: float, tau_free: bool, level: float, n_walls: int
-) -> Layout:
-    """Count rows and cones for a case with ``n_cuts`` tangent planes and ``n_walls`` off the terrain."""
+def layout(case: ScaledCase, n_planes: int, energy_weight: float, tau_free: bool) -> Layout:
+    """Count rows and cones for a case with ``n_planes`` tangent planes and walls."""
     n_equal = 7 if case.on_ellipsoid else 6
-    n_planes = n_cuts + n_walls
-    n_rows = n_equal + n_planes + (1 if case.on_ellipsoid else 0) + (1 if case.propellant < 1.0 else 0)
+    first = n_equal + (1 if case.on_ellipsoid else 0) + (1 if case.propellant < 1.0 else 0)
     n_cones = case.arc_fractions.shape[0] + 2
-    return Layout(n_equal, n_cuts, n_rows, n_cones, energy_weight, tau_free, level, n_walls)
+    return Layout(n_equal, first, first + n_planes, n_cones, energy_weight, tau_free)
 
 
 @part
 def fill_handover_rows(case: ScaledCase, model: Model) -> None:
-    """Constant derivatives of the six matching rows with respect to y."""
+    """Constant derivatives of the six matching rows with respect to y and to the basis."""
     spin = case.spin
     _, _, r_e, r_s, v_e, v_s = arc_weights(1.0, case.final_time)
     for i in range(6):
         for a in range(7):
             model.row_y[i, a] = 0.0
+        for b in range(model.row_mix.shape[1]):
+            model.row_mix[i, b] = 1.0 if i == b else 0.0
+        model.row_end[i] = float(model.basis.shape[0])
     for i in range(3):
         model.row_y[i, 1 + i], model.row_y[i, 4 + i] = -r_e, -r_s
         model.row_y[3 + i, 1 + i], model.row_y[3 + i, 4 + i] = -v_e, -v_s
@@ -83,7 +86,7 @@ def fill_handover_rows(case: ScaledCase, model: Model) -> None:
     model.row_y[4, 4] -= spin * r_s
 
 
-@part
+@kernel
 def fill_arc_cones(case: ScaledCase, model: Model) -> None:
     """Constant derivatives of the final stage's thrust with respect to (a_e, a_s).
 
@@ -112,12 +115,9 @@ def fill_glide_cones(case: ScaledCase, normal: Floats, model: Model) -> None:
     first = case.arc_fractions.shape[0]
     n0, n1, n2 = normal[0], normal[1], normal[2]
     # any two unit vectors that complete the normal
-    if abs(n2) < 0.9:
-        scale = 1.0 / math.sqrt(n0 * n0 + n1 * n1)
-        e0, e1, e2 = -n1 * scale, n0 * scale, 0.0
-    else:
-        scale = 1.0 / math.sqrt(n1 * n1 + n2 * n2)
-        e0, e1, e2 = 0.0, -n2 * scale, n1 * scale
+    flat = abs(n2) < 0.9
+    scale = 1.0 / math.sqrt(choose(flat, n0 * n0 + n1 * n1, n1 * n1 + n2 * n2))
+    e0, e1, e2 = scale * choose(flat, -n1, 0.0), scale * choose(flat, n0, -n2), scale * choose(flat, 0.0, n1)
     f0, f1, f2 = n1 * e2 - n2 * e1, n2 * e0 - n0 * e2, n0 * e1 - n1 * e0
     frame = ((n0, n1, n2), (e0, e1, e2), (f0, f1, f2))
     for j in range(2):
@@ -125,13 +125,13 @@ def fill_glide_cones(case: ScaledCase, normal: Floats, model: Model) -> None:
         A[:, :] = 0.0
         model.cone_offset[first + j, :] = 0.0
         for i in range(3):
-            scale = case.tan_half_angle if i == 0 else 1.0
+            wide = case.tan_half_angle if i == 0 else 1.0
             for c in range(3):
                 if j == 0:
-                    A[i, 1 + c] = 2.0 * scale * frame[i][c]
-                    A[i, 4 + c] = scale * frame[i][c]
+                    A[i, 1 + c] = 2.0 * wide * frame[i][c]
+                    A[i, 4 + c] = wide * frame[i][c]
                 else:
-                    A[i, 1 + c] = scale * frame[i][c]
+                    A[i, 1 + c] = wide * frame[i][c]
 
 
 @part
@@ -203,14 +203,7 @@ def _refresh_matching(case: ScaledCase, target: Floats, path: Path, model: Model
     model.row_value[3] = speed[0] + case.spin * yy - v_e * y[1] - v_s * y[4]
     model.row_value[4] = speed[1] - case.spin * x - v_e * y[2] - v_s * y[5]
     model.row_value[5] = speed[2] - v_e * y[3] - v_s * y[6]
-    pull_back(path, n, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, model.row_thrust[0])
-    pull_back(path, n, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, model.row_thrust[1])
-    pull_back(path, n, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, model.row_thrust[2])
-    pull_back(path, n, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, model.row_thrust[3])
-    pull_back(path, n, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, model.row_thrust[4])
-    pull_back(path, n, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, model.row_thrust[5])
-    for r in range(6):
-        model.row_end[r] = n
+    pull_back(path, model.basis)
 
 
 @part
@@ -226,7 +219,7 @@ def _refresh_handover_on_ellipsoid(case: ScaledCase, target: Floats, model: Mode
     _, _, r_e, r_s, _, _ = arc_weights(1.0, case.final_time)
     normal, weights, wx = (nx, ny, nz), (r_e, r_s), case.inverse_axes
     model.row_value[6] = level - 1.0
-    model.row_end[6] = 0
+    model.row_end[6] = 0.0
     model.row_y[6, 0] = 0.0
     bend = max(point.multiplier[6], 0.0) / level
     for p in range(2):
@@ -251,7 +244,7 @@ def _refresh_approach(case: ScaledCase, target: Floats, model: Model, y: Floats,
     _, _, r_e, r_s, v_e, v_s = arc_weights(1.0, case.final_time)
     normal, wx = (nx, ny, nz), case.inverse_axes
     level = nx * px + ny * py + nz * pz
-    model.row_end[r] = 0
+    model.row_end[r] = 0.0
     model.row_y[r, 0] = model.row_value[r] = 0.0
     for i in range(3):
         turn = 0.0  # of the normal, as the handover moves along i
@@ -269,9 +262,9 @@ def _refresh_propellant(
 ) -> None:
     """Row r: propellant left, P - (1 - m_touchdown) >= 0, with an isotropic bound of its curvature."""
     n = path.gradient.shape[0]
-    h, flow = 1.0 / n, case.mass_flow
+    h, flow, own = 1.0 / n, case.mass_flow, model.basis.shape[1] - 1
     rounded = 0.0  # what the rounded cones of thrust burn more than the flight
-    model.row_end[r] = n
+    model.row_end[r], model.row_mix[r, own] = float(n), 1.0
     eta = -point.multiplier[r]
     for k in range(n):
         F = point.thrust[k]
@@ -279,7 +272,7 @@ def _refresh_propellant(
         norm = math.sqrt(square + COAST * COAST)
         rounded += flow * h * (norm - math.sqrt(square))
         for i in range(3):
-            model.row_thrust[r, k, i] = -flow * h * F[i] / norm
+            model.basis[k, own, i] = -flow * h * F[i] / norm
         model.thrust_curvature[k] += eta * flow * h / norm
     model.row_value[r] = case.propellant - (1.0 - touchdown_mass) - rounded
     model.row_y[r, :] = 0.0
@@ -288,14 +281,14 @@ def _refresh_propellant(
     for j in range(last + 1):
         width = 0.5 * (fractions[min(j + 1, last)] - fractions[max(j - 1, 0)])
         A, b = model.cone_map[j], model.cone_offset[j]
-        thrust = np.zeros(3)
-        for i in range(3):
-            thrust[i] = b[1 + i]
-            for a in range(1, 7):
-                thrust[i] += A[1 + i, a] * point.y[a]
-        norm = max(math.sqrt(thrust[0] ** 2 + thrust[1] ** 2 + thrust[2] ** 2), SMALL_THRUST)
+        t0, t1, t2 = b[1], b[2], b[3]
         for a in range(1, 7):
-            along = (A[1, a] * thrust[0] + A[2, a] * thrust[1] + A[3, a] * thrust[2]) / norm
+            t0 += A[1, a] * point.y[a]
+            t1 += A[2, a] * point.y[a]
+            t2 += A[3, a] * point.y[a]
+        norm = max(math.sqrt(t0 * t0 + t1 * t1 + t2 * t2), SMALL_THRUST)
+        for a in range(1, 7):
+            along = (A[1, a] * t0 + A[2, a] * t1 + A[3, a] * t2) / norm
             model.row_y[r, a] -= flow * touchdown_mass * case.final_time * width * along
 
 
@@ -323,7 +316,7 @@ def _add_mass_gradient(case: ScaledCase, point: Point, path: Path, model: Model)
     return costate
 
 
-@kernel
+@inlined
 def refresh(
     case: ScaledCase,
     target: Floats,
@@ -336,7 +329,8 @@ def refresh(
 ) -> tuple[float, float]:
     """Linearise the whole problem at ``point``: fly it, and fill every row, cone and gradient.
 
-    Where ``retake``, the tangent planes are moved to the path.
+    Where ``retake``, the tangent planes are moved to the path. What is constant while a facet is solved has
+    been filled before.
 
     Returns
     -------
@@ -349,7 +343,7 @@ def refresh(
     h, rho, y = 1.0 / n, plan.energy_weight, point.y
     fly(case, point.thrust, path)
     fill_energy(case, rho, model)
-    touchdown_mass = refresh_arc(case, target, float(path.mass[n]), model, y)
+    touchdown_mass = refresh_arc(case, target, path.mass[n], model, y)
     _refresh_matching(case, target, path, model, y)
     energy = 0.0
     for k in range(n):
@@ -367,10 +361,10 @@ def refresh(
         model.y_gradient[3 + i] = rho * weight * (2.0 * s + e)
     if case.on_ellipsoid:
         _refresh_handover_on_ellipsoid(case, target, model, point)
-        _refresh_approach(case, target, model, y, plan.n_equal + plan.n_cuts + plan.n_walls)
-    counts = plan.n_cuts, plan.n_walls
-    refresh_planes(case, target, path, model, cuts, plan.n_equal, counts, plan.level, retake, y)
+        _refresh_approach(case, target, model, y, plan.n_equal)
     if case.propellant < 1.0:
-        _refresh_propellant(case, point, path, model, plan.n_rows - 1, touchdown_mass)
+        _refresh_propellant(case, point, path, model, plan.first_plane - 1, touchdown_mass)
+    n_planes = plan.n_rows - plan.first_plane
+    refresh_planes(case, target, path, model, cuts, plan.first_plane, n_planes, retake, y)
     fill_row_pull(point, model, plan.n_rows)
     return energy, _add_mass_gradient(case, point, path, model)

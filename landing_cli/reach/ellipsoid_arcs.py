@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.kernel import inlined, kernel, part
+from landing_cli.kernel_lanes import WIDTH, lane
 from landing_cli.reach.free_batch import CutBatch
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_level, least_between
-from landing_cli.reach.shooting import SUBSTEPS, fly_accurately
+from landing_cli.reach.shooting import SUBSTEPS, Flights, fly_some, new_flights
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -43,19 +44,17 @@ def lowest_level(case: ScaledCase, position: Floats) -> float:
 
 
 @inlined
-def lowest_level_between(case: ScaledCase, thrust: Floats, samples: Floats) -> float:
-    """Least |xi| of an accurate flight of ``thrust``, between the nodes too; fills ``samples``.
+def lowest_level_between(case: ScaledCase, flights: Flights) -> float:
+    """Least |xi| of accurate flights, between the nodes too.
 
     Thrust is constant within an interval, so |xi| is smooth there: a parabola through its ends and its
     middle finds the dip.
     """
-    steps = samples.shape[0] - 1
-    fly_accurately(case, thrust, samples)
-    lowest, before, middle = 1e9, 1e9, 1e9
-    for row in range(steps + 1):
-        angle = case.spin * (row / steps - 1.0)
+    samples = flights.samples
+    lowest = before = middle = 1e9
+    for row in range(samples.shape[0]):
         x = samples[row]
-        level = ellipsoid_level(case, math.cos(angle), math.sin(angle), x[0], x[1], x[2])
+        level = ellipsoid_level(case, flights.cosine[row], flights.sine[row], x[0], x[1], x[2])
         if row > 0 and row % SUBSTEPS == 0:
             lowest = min(lowest, least_between(before, middle, level))
         if row % SUBSTEPS == 0:
@@ -74,7 +73,7 @@ def _unit_coordinates(case: ScaledCase, k: int, x: Floats, xi: Floats) -> None:
     xi[2] = x[2] * case.inverse_axes[2]
 
 
-@kernel
+@part
 def _plane_normal(case: ScaledCase, k: int, u: Floats, normal: Floats) -> None:
     """Normal, in solver axes, of the plane that touches the ellipsoid where xi = u at node k."""
     c, s = case.node_cos[k], case.node_sin[k]
@@ -82,7 +81,7 @@ def _plane_normal(case: ScaledCase, k: int, u: Floats, normal: Floats) -> None:
     normal[0], normal[1], normal[2] = c * a - s * b, s * a + c * b, u[2] * case.inverse_axes[2]
 
 
-@kernel
+@part
 def _dot(u: Floats, v: Floats) -> float:
     """Scalar product."""
     return float(u[0] * v[0] + u[1] * v[1] + u[2] * v[2])
@@ -190,12 +189,19 @@ def lowest_levels(case: ScaledCase, positions: Floats, out: Floats) -> None:
         out[i] = lowest_level(case, positions[i])
 
 
-@kernel
 def lowest_levels_between(case: ScaledCase, thrusts: Floats, out: Floats) -> None:
     """Fill (n,) least |xi| of accurate flights of (n, N, 3) thrusts, between the nodes too."""
-    samples = np.empty((thrusts.shape[1] * SUBSTEPS + 1, 7))
-    for i in range(thrusts.shape[0]):
-        out[i] = lowest_level_between(case, thrusts[i], samples)
+    fill_levels_between(case, thrusts, new_flights(case, SUBSTEPS), out)
+
+
+@kernel
+def fill_levels_between(case: ScaledCase, thrusts: Floats, flights: Flights, out: Floats) -> None:
+    """See :func:`lowest_levels_between`."""
+    for first in range(0, thrusts.shape[0], WIDTH):
+        fly_some(case, thrusts, first, flights)
+        lowest = lowest_level_between(case, flights)
+        for place in range(min(WIDTH, thrusts.shape[0] - first)):
+            out[first + place] = lane(lowest, place)
 
 
 @kernel

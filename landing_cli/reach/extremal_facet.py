@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import inlined, kernel, part
+from landing_cli.kernel import inlined, part
 from landing_cli.optimize.sqp import (
     LocalModel,
     add_secant,
@@ -135,7 +135,7 @@ def start_extremal(problem: ExtremalProblem, costates: Floats, extremal: Extrema
         y[7 + i] = costates[i]
 
 
-@kernel
+@part
 def _try(
     problem: ExtremalProblem, target: Floats, normal: Floats, costates: Floats, flight: Flight, search: Search
 ) -> Trial:

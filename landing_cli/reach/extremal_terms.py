@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from landing_cli.body.gravity.kernels import acceleration_and_gradient
 from landing_cli.flight.extremal import extremal_scale
-from landing_cli.kernel import inlined, kernel, part
+from landing_cli.kernel import inlined, part
 from landing_cli.reach.costate_dynamics import Field, gravity_point
 from landing_cli.reach.ellipsoid_dips import MAX_DIPS, add_level_bend, level_and_gradient
 from landing_cli.reach.records import LandingCase
@@ -134,7 +134,7 @@ def _arc_acceleration(
         D[i, i], D[i, 3 + i] = ad, av
 
 
-@kernel
+@part
 def _arc_thrust(
     problem: ExtremalProblem, target: Floats, x: Floats, sigma: float, thrust: Floats, D: Floats
 ) -> None:

@@ -15,7 +15,7 @@ from landing_cli.reach.ellipsoid_arcs import (
     lowest_levels_between,
 )
 from landing_cli.reach.free_batch import Batch, CutBatch, WallBatch, new_batch, no_cuts, no_walls, solve_many
-from landing_cli.reach.free_solve import CONVERGED, STALLED, new_solver
+from landing_cli.reach.free_solve import CONVERGED, STALLED, own_solver
 from landing_cli.reach.scaled_case import ScaledCase
 
 Floats = NDArray[np.float64]
@@ -67,12 +67,16 @@ def best_flights(question: Question) -> tuple[Batch, Flags]:
     lowest_levels(question.case, best.position, lowest)
     around = (best.status == CONVERGED) & (lowest < TOUCH)
     todo = np.flatnonzero(around)
+    if len(todo) == 0:
+        return best, around
     free_position = best.position[todo].copy()
     best.status[todo] = STALLED
     value = np.full(n, np.inf)
     second = np.ones(len(todo), dtype=bool)
     for side in (1.0, -1.0):
         chosen = todo[second]
+        if len(chosen) == 0:
+            break
         flights, froze = _around(_subset(question, chosen), free_position[second], side)
         best.iterations[chosen] += flights.iterations
         found = flights.level if question.tau_free else flights.energy
@@ -139,6 +143,8 @@ def _raise_over_dips(question: Question, flights: Batch, cuts: CutBatch, level: 
     short = _shortfalls(question.case, flights, chosen)
     for boldness in RAISES:
         chosen, short = chosen[short > 0.0], short[short > 0.0]
+        if len(chosen) == 0:
+            break
         level[chosen] += boldness * short
         solved = _solve_again(question, flights, cuts, level, level, chosen)
         short[solved] = _shortfalls(question.case, flights, chosen[solved])
@@ -204,6 +210,8 @@ def _solve(
     walls: WallBatch | None = None,
 ) -> Batch:
     """Run the kernel on a whole batch."""
+    if len(question.targets) == 0:
+        return new_batch(0, len(question.case.mid_cos))
     walls = no_walls(len(question.targets)) if walls is None else walls
     out = new_batch(len(question.targets), len(question.case.mid_cos))
     solve_many(
@@ -220,7 +228,7 @@ def _solve(
         question.tube,
         question.arc_bound,
         False,
-        new_solver(question.case, walls.node.shape[1]),
+        own_solver(question.case, walls.node.shape[1]),
         out,
     )
     return out

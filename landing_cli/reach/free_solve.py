@@ -1,21 +1,24 @@
-"""One facet by the conic interior-point method: cold start, iterations, verdict of the solver.
+"""Facets by the conic interior-point method: cold start, iterations, verdicts of the solver.
 
 Flight, gravity, masses and tangent planes are linearised anew at every iteration, so there is no outer
-loop: the interior-point method is at the same time the Newton method on the nonlinear problem.
+loop: the interior-point method is at the same time the Newton method on the nonlinear problem. As many facets
+as there are lanes are iterated together (`kernel_lanes`); each has its own count of iterations.
 """
 
 from __future__ import annotations
 
 import math
+import threading
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import inlined, kernel, part
-from landing_cli.kernel_record import by_reference
+from landing_cli.kernel import inlined, inner, part
+from landing_cli.kernel_lanes import WIDTH, any_lane, choose, lane, new_lanes, put_lane, take_lane
+from landing_cli.kernel_record import always_alike, by_reference
 from landing_cli.optimize.conic_ipm import advance, residuals
-from landing_cli.optimize.conic_records import Model, Point, Step, new_model, new_point, new_step
+from landing_cli.optimize.conic_records import STATE, Model, New, Point, Step, new_model, new_point, new_step
 from landing_cli.reach.certificate import certified_thrust_level, linearised_thrust_level
 from landing_cli.reach.descent_model import (
     Layout,
@@ -27,7 +30,7 @@ from landing_cli.reach.descent_model import (
 )
 from landing_cli.reach.planes import Cuts, new_cuts
 from landing_cli.reach.scaled_case import ScaledCase
-from landing_cli.reach.shooting import Path, fly, measure_defect, new_path
+from landing_cli.reach.shooting import Path, measure_defect, new_path
 
 Floats = NDArray[np.float64]
 
@@ -41,165 +44,301 @@ FIRST_CERTIFICATE = 4
 FIRST_BLOCKED, BLOCKED_LEVEL = 8, 1.0 + 1e-4
 # The defect of the flight is measured at iterations 5, 9, 13, ...: it hardly changes after that.
 FIRST_DEFECT, DEFECT_PERIOD = 1, 4
+# Facets without planes begin on half as many intervals, where there are so many, for so many iterations.
+HALVED_FROM, BEGINNING = 40, 4
+_kept = threading.local()
+
+# Places in a solver's marks, 1 in lanes: the facet begins, its flight's defect is measured, its planes are
+# retaken, it is new to the lane.
+BEGINS, MEASURED, RETAKEN, NEW = range(4)
+# Places in a solver's numbers: residuals and gap, J (scaled), the mass costate at the start, the least target
+# of the next step.
+PRIMAL, DUAL, GAP, ENERGY, MASS_COSTATE, LEAST_TARGET = range(6)
 
 
 @by_reference
 class Solver(NamedTuple):
-    """Everything one facet's solve works in; allocated once and used for many facets."""
+    """Everything that a solve works in; allocated once and used for many facets."""
 
     point: Point
     model: Model
     step: Step
     path: Path
     cuts: Cuts
-    duals: Floats  # (J, 4)
+    target: Floats  # (3,) touchdown point, scaled, body axes
+    normal: Floats  # (3,) of the facet, outward
+    drift: Floats  # (6,) position and velocity at the end of the flight without thrust
+    marks: Floats  # (4,) see BEGINS to NEW
+    numbers: Floats  # (6,) of the iteration: see PRIMAL to LEAST_TARGET
+
+
+@by_reference
+class Single(NamedTuple):
+    """One facet's part of what is solved in lanes, for what looks at one facet at a time."""
+
+    point: Point
+    model: Model
+    cuts: Cuts
+    target: Floats  # (3,)
+    to_start: Floats  # (6, 6)
+    numbers: Floats  # (6,)
+    duals: Floats  # (J, 4) scratch space
+
+
+@always_alike
+class LaneSolver(NamedTuple):
+    """A solver of as many facets as there are lanes."""
+
+    lanes: Solver
+    begun: Solver  # on half as many intervals, for the first iterations of facets without planes
+    half: ScaledCase  # the case on these
+    single: Single
+    facet: NDArray[np.int64]  # (2, WIDTH) place in the batch, -1: none; of the lanes, then of the begun
+    iteration: NDArray[np.int64]  # (2, WIDTH)
+    bound: Floats  # (2, WIDTH)
 
 
 class Outcome(NamedTuple):
     """How a solve ended."""
 
-    status: int  # STALLED, CONVERGED, CERTIFIED or BLOCKED
-    iterations: int
-    energy: float  # J, scaled
+    status: int  # STALLED, CONVERGED, CERTIFIED or BLOCKED; -1: it goes on
     bound: float  # certified lower bound on the thrust level
-    mass_costate: float  # at the start
 
 
-def new_solver(case: ScaledCase, walls: int = 0) -> Solver:
-    """Allocate a solver for a scaled case, with room for so many walls off the terrain."""
-    n = case.mid_cos.shape[0]
-    n_cones = case.arc_fractions.shape[0] + 2
-    n_rows = 7 + (n + 1) + walls + 2
+def new_solver_of(
+    n_nodes: int, n_cones: int, n_rows: int, planes: int, n_basis: int, new: New = np.zeros
+) -> Solver:
+    """Allocate a solver with room for so many rows and planes, of arrays that ``new`` makes."""
     return Solver(
-        new_point(n, n_cones, n_rows),
-        new_model(n, n_cones, n_rows),
-        new_step(n, n_cones, n_rows),
-        new_path(n),
-        new_cuts(n + 1 + walls),
-        np.zeros((n_cones, 4)),
+        new_point(n_nodes, n_cones, n_rows, new),
+        new_model(n_nodes, n_cones, n_rows, n_basis, new),
+        new_step(n_nodes, n_cones, n_rows, n_basis, new),
+        new_path(n_nodes, new),
+        new_cuts(planes, new),
+        new(3),
+        new(3),
+        new(6),
+        new(4),
+        new(6),
+    )
+
+
+def basis_of(case: ScaledCase) -> int:
+    """Functionals of the thrust that rows are mixed of: the state at the end, and scarce propellant."""
+    return STATE + (1 if case.propellant < 1.0 else 0)
+
+
+def new_solver(case: ScaledCase, walls: int = 0) -> LaneSolver:
+    """Allocate a solver for a scaled case, with room for so many walls off the terrain."""
+    n, basis = case.mid_cos.shape[0], basis_of(case)
+    n_cones = case.arc_fractions.shape[0] + 2
+    planes = n + 1 + walls
+    n_rows = 7 + planes + 2
+    whole = np.int64
+    return LaneSolver(
+        new_solver_of(n, n_cones, n_rows, planes, basis, new_lanes),
+        new_solver_of(n // 2, n_cones, 9, 0, basis, new_lanes),
+        on_half(case),
+        Single(
+            new_point(n, n_cones, n_rows),
+            new_model(n, n_cones, n_rows, basis),
+            new_cuts(planes),
+            np.zeros(3),
+            np.zeros((6, 6)),
+            np.zeros(6),
+            np.zeros((n_cones, 4)),
+        ),
+        np.full((2, WIDTH), -1, dtype=whole),
+        np.zeros((2, WIDTH), dtype=whole),
+        np.zeros((2, WIDTH)),
+    )
+
+
+def own_solver(case: ScaledCase, walls: int = 0) -> LaneSolver:
+    """Return this thread's solver for cases of such sizes and rows: making one takes as long as a facet."""
+    key = case.mid_cos.shape[0], case.arc_fractions.shape[0], walls, basis_of(case), case.on_ellipsoid
+    if key not in _kept.__dict__.setdefault("solvers", {}):
+        _kept.solvers[key] = new_solver(case, walls)
+    solver: LaneSolver = _kept.solvers[key]._replace(half=on_half(case))
+    return solver
+
+
+def on_half(case: ScaledCase) -> ScaledCase:
+    """The case on half as many intervals, each made of two."""
+    return case._replace(
+        node_cos=case.node_cos[::2].copy(),
+        node_sin=case.node_sin[::2].copy(),
+        mid_cos=case.node_cos[1::2].copy(),
+        mid_sin=case.node_sin[1::2].copy(),
     )
 
 
 @inlined
-def _start_thrust(case: ScaledCase, target: Floats, normal: Floats, solver: Solver) -> None:
+def _start_thrust(case: ScaledCase, begins: bool, solver: Solver) -> float:
     """Least-energy thrust to a plausible handover, from the unpowered flight's miss, clipped.
 
-    F = f0 + f1 s with int s F = E_r and int F = E_v, where E is the miss in position and velocity.
+    F = f0 + f1 s with int s F = E_r and int F = E_v, where E is the miss in position and velocity. Returns
+    the mass at the handover.
     """
-    point, path = solver.point, solver.path
-    n, y = point.thrust.shape[0], point.y
-    point.thrust[:, :] = 0.0
-    path.defect[:] = 0.0
-    fly(case, point.thrust, path)
-    y[0] = 1.0
-    x = np.empty(3)
-    v = np.empty(3)
+    point, y, target, normal, drift = solver.point, solver.point.y, solver.target, solver.normal, solver.drift
+    n, T = point.thrust.shape[0], case.final_time
+    y[0] = choose(begins, 1.0, y[0])
     for i in range(3):
-        y[1 + i], y[4 + i] = 0.5 * normal[i], -0.2 * normal[i]
-        x[i] = target[i] + case.final_time**2 / 6.0 * 0.8 * normal[i]
-        v[i] = -case.final_time / 2.0 * 0.3 * normal[i]
-    v[0] -= case.spin * x[1]
-    v[1] += case.spin * x[0]
-    for i in range(3):
-        miss_r, miss_v = x[i] - path.position[n, i], v[i] - path.velocity[n, i]
-        f1 = 12.0 * (miss_r - 0.5 * miss_v)
-        f0 = miss_v - 0.5 * f1
-        for k in range(n):
-            point.thrust[k, i] = f0 + f1 * (1.0 - (k + 0.5) / n)
+        y[1 + i] = choose(begins, 0.5 * normal[i], y[1 + i])
+        y[4 + i] = choose(begins, -0.2 * normal[i], y[4 + i])
+    x0 = target[0] + T * T / 6.0 * 0.8 * normal[0]
+    x1 = target[1] + T * T / 6.0 * 0.8 * normal[1]
+    x2 = target[2] + T * T / 6.0 * 0.8 * normal[2]
+    v0 = -T / 2.0 * 0.3 * normal[0] - case.spin * x1 - drift[3]
+    v1 = -T / 2.0 * 0.3 * normal[1] + case.spin * x0 - drift[4]
+    v2 = -T / 2.0 * 0.3 * normal[2] - drift[5]
+    a0, a1, a2 = (
+        12.0 * (x0 - drift[0] - 0.5 * v0),
+        12.0 * (x1 - drift[1] - 0.5 * v1),
+        12.0 * (x2 - drift[2] - 0.5 * v2),
+    )
+    used = choose(x0 > 0.0, 0.0, 0.0)
     for k in range(n):
-        F = point.thrust[k]
-        norm = math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2])
-        if norm > 0.7:
-            for i in range(3):
-                F[i] *= 0.7 / norm
+        F, s = point.thrust[k], 0.5 - (k + 0.5) / n
+        f0, f1, f2 = v0 + a0 * s, v1 + a1 * s, v2 + a2 * s
+        norm = math.sqrt(f0 * f0 + f1 * f1 + f2 * f2)
+        scale = choose(norm > 0.7, 0.7 / norm, 1.0)
+        F[0], F[1] = choose(begins, scale * f0, F[0]), choose(begins, scale * f1, F[1])
+        F[2] = choose(begins, scale * f2, F[2])
+        used += math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2])
+    return 1.0 - case.mass_flow * used / n
 
 
-@kernel
-def cold_start(case: ScaledCase, target: Floats, normal: Floats, plan: Layout, solver: Solver) -> None:
-    """Set the iterate to a well-centred point; the objective's scale sets the duals."""
+@inlined
+def fill_constants(case: ScaledCase, solver: Solver) -> None:
+    """Fill what stays as it is while facets are solved."""
+    fill_handover_rows(case, solver.model)
+    fill_arc_cones(case, solver.model)
+    fill_glide_cones(case, solver.normal, solver.model)
+
+
+@inlined
+def cold_start(case: ScaledCase, plan: Layout, begins: bool, solver: Solver) -> None:
+    """Set the iterate to a well-centred point where a facet begins; the objective's scale sets the duals.
+
+    The solver's target, normal, drift, constants, planes and ``row_live`` are given.
+    """
     point, model = solver.point, solver.model
-    _start_thrust(case, target, normal, solver)
-    fill_handover_rows(case, model)
-    fill_arc_cones(case, model)
-    fill_glide_cones(case, normal, model)
+    handover_mass = _start_thrust(case, begins, solver)
     n = point.thrust.shape[0]
     scale = 1.0 if plan.tau_free else plan.energy_weight
+    for i in range(6):
+        solver.path.defect[i] = choose(begins, 0.0, solver.path.defect[i])
     if plan.tau_free:
-        point.y[0] = 1.2
-    point.multiplier[:] = 0.0
+        point.y[0] = choose(begins, 1.2, point.y[0])
     for k in range(n):
-        point.node_dual[k, 0] = 0.5 * scale / n
+        z, head = point.node_dual[k], 0.5 * scale / n
+        z[0] = choose(begins, head, z[0])
         for i in range(3):
-            point.node_dual[k, 1 + i] = -0.3 * point.node_dual[k, 0] * point.thrust[k, i] / point.y[0]
-    for r in range(plan.n_equal, plan.n_rows):
-        point.slack[r] = 0.05
-        point.multiplier[r] = -0.05 * scale
-    fly(case, point.thrust, solver.path)
-    refresh_arc(case, target, float(solver.path.mass[n]), model, point.y)
+            tail = -0.3 * head * point.thrust[k, i] / point.y[0]
+            z[1 + i] = choose(begins, tail, z[1 + i])
+    for r in range(point.multiplier.shape[0]):
+        held = 0.0 if r < plan.n_equal else 0.05
+        # a row that is not there has no slack, and a multiplier that only keeps divisions finite
+        there = model.row_live[r] > 0.0
+        slack, multiplier = choose(there, held, 0.0), choose(there, -held * scale, -1.0)
+        point.slack[r] = choose(begins, slack, point.slack[r])
+        point.multiplier[r] = choose(begins, multiplier, point.multiplier[r])
+    refresh_arc(case, solver.target, handover_mass, model, point.y)
     for j in range(plan.n_cones):
-        s, norm2 = point.cone_slack[j], 0.0
+        s, z = point.cone_slack[j], point.cone_dual[j]
+        head = norm2 = 0.0
         for i in range(4):
-            s[i] = model.cone_offset[j, i]
+            total = model.cone_offset[j, i]
             for a in range(7):
-                s[i] += model.cone_map[j, i, a] * point.y[a]
-            norm2 += s[i] * s[i] if i > 0 else 0.0
-        s[0] = max(s[0], math.sqrt(norm2) + 0.1)
-        point.cone_dual[j, :] = 0.0
-        point.cone_dual[j, 0] = 0.1 * scale
+                total += model.cone_map[j, i, a] * point.y[a]
+            if i == 0:
+                head = total
+            else:
+                norm2 += total * total
+                s[i] = choose(begins, total, s[i])
+            z[i] = choose(begins, 0.1 * scale if i == 0 else 0.0, z[i])
+        s[0] = choose(begins, max(head, math.sqrt(norm2) + 0.1), s[0])
 
 
 @part
-def _certificate(
+def hand_over(place: int, to: int, solver: LaneSolver) -> None:
+    """Go on with a begun facet on twice as many intervals: each halves, and so do the duals of its thrust."""
+    source, into, single = solver.begun, solver.lanes, solver.single
+    old, new, own = source.point, into.point, single.point
+    take_lane(old.thrust, place, own.thrust)
+    take_lane(old.node_dual, place, own.node_dual)
+    for k in range(own.thrust.shape[0] - 1, -1, -1):
+        for i in range(3):
+            own.thrust[k, i] = own.thrust[k // 2, i]
+        for i in range(4):
+            own.node_dual[k, i] = 0.5 * own.node_dual[k // 2, i]
+    own.multiplier[:] = -1.0  # as of rows that are not there
+    own.slack[:] = 0.0
+    take_lane(old.multiplier, place, own.multiplier)
+    take_lane(old.slack, place, own.slack)
+    take_lane(old.cone_slack, place, own.cone_slack)
+    put_lane(new.cone_slack, to, own.cone_slack)
+    take_lane(old.cone_dual, place, own.cone_dual)
+    put_lane(new.cone_dual, to, own.cone_dual)
+    take_lane(old.y, place, own.y)
+    put_lane(new.y, to, own.y)
+    put_lane(new.thrust, to, own.thrust)
+    put_lane(new.node_dual, to, own.node_dual)
+    put_lane(new.multiplier, to, own.multiplier)
+    put_lane(new.slack, to, own.slack)
+    single.numbers[:] = 0.0
+    put_lane(into.path.defect, to, single.numbers)
+
+
+@part
+def take_out(solver: Solver, place: int, whole: bool, single: Single) -> None:
+    """Copy what the certificates look at out of a lane; the whole linearised problem, or its duals."""
+    point, model, own, its = solver.point, solver.model, single.point, single.model
+    take_lane(point.multiplier, place, own.multiplier)
+    take_lane(point.cone_dual, place, own.cone_dual)
+    take_lane(model.cone_map, place, its.cone_map)
+    take_lane(model.row_y, place, its.row_y)
+    take_lane(solver.target, place, single.target)
+    take_lane(solver.cuts.node, place, single.cuts.node)
+    take_lane(solver.cuts.normal, place, single.cuts.normal)
+    if whole:
+        take_lane(model.row_value, place, its.row_value)
+        take_lane(model.row_pull, place, its.row_pull)
+        take_lane(model.cone_offset, place, its.cone_offset)
+        take_lane(point.y, place, own.y)
+        take_lane(point.thrust, place, own.thrust)
+
+
+@part
+def judge(
     case: ScaledCase,
-    target: Floats,
-    tube: Floats,
-    arc_bound: float,
     plan: Layout,
-    planes: int,
     solver: Solver,
-) -> float:
-    """Bound the thrust level by the current multipliers."""
-    point = solver.point
-    return certified_thrust_level(
-        case,
-        target,
-        tube,
-        arc_bound,
-        solver.model,
-        point.multiplier,
-        point.cone_dual,
-        solver.duals,
-        solver.cuts,
-        planes,
-        plan.level,
-    )
-
-
-@inlined
-def solve(
-    case: ScaledCase,
-    target: Floats,
-    normal: Floats,
-    plan: Layout,
-    retake_from: int,
+    place: int,
+    iteration: int,
+    planes: int,
     tube: Floats,
     arc_bound: float,
     limit: int,
     prove: bool,
-    solver: Solver,
+    single: Single,
+    known: float,
 ) -> Outcome:
-    """Solve one facet from a cold start.
+    """Tell whether the facet in a lane is done.
 
     Parameters
     ----------
-    case : ScaledCase
-        The case.
-    target, normal : (3,) float
-        Touchdown point (scaled) and outward facet normal, body axes.
-    plan : Layout
-        Rows, cones and objective.
-    retake_from : int
-        Iteration from which the tangent planes are moved to the current path.
+    case, plan : ScaledCase, Layout
+        The case, its rows and cones.
+    solver : Solver
+        In lanes, linearised.
+    place : int
+        Which lane.
+    iteration : int
+        Of the facet.
+    planes : int
+        Tangent planes of the facet.
     tube, arc_bound : (N,) float, float
         Bounds of gravity for the certificate.
     limit : int
@@ -207,53 +346,90 @@ def solve(
     prove : bool
         Bound the thrust level of the flights that keep to the planes, not of all flights, and stop as soon
         as that is above 1.
-    solver : Solver
-        Its cuts are given; its point holds the answer.
+    single : Single
+        Scratch space.
+    known : float
+        The bound so far.
 
     Returns
     -------
     outcome : Outcome
-        How it ended.
+        How it ended, if it did.
     """
-    point, model, step, path = solver.point, solver.model, solver.step, solver.path
-    cold_start(case, target, normal, plan, solver)
+    numbers = single.numbers
+    take_lane(solver.numbers, place, numbers)
     scale = 1.0 if plan.tau_free else plan.energy_weight
-    planes = plan.n_cuts if prove else 0
-    status, bound, energy, mass_costate = STALLED, 0.0, 0.0, 0.0
-    iteration = 0
-    while iteration < limit:
-        iteration += 1
-        if iteration > 1 and iteration % DEFECT_PERIOD == FIRST_DEFECT:
-            measure_defect(case, point.thrust, path)
-        retake = iteration >= retake_from
-        energy, mass_costate = refresh(case, target, plan, solver.cuts, retake, point, path, model)
-        primal, dual, gap = residuals(
-            point, model, step, plan.n_equal, plan.n_rows, plan.n_cones, plan.tau_free
+    converged = (
+        iteration > DEFECT_PERIOD
+        and numbers[PRIMAL] < TOLERANCE
+        and numbers[DUAL] < DUAL_TOLERANCE * scale
+        and numbers[GAP] < GAP_TOLERANCE * scale
+    )
+    status, bound = CONVERGED if converged else -1, known
+    proves = (prove or not plan.tau_free) and not converged and iteration >= FIRST_CERTIFICATE
+    blocks = not plan.tau_free and not converged and iteration >= FIRST_BLOCKED
+    if proves or (plan.tau_free and converged):
+        take_out(solver, place, blocks, single)
+        counted = planes if prove else planes - planes
+        level = lane(solver.cuts.offset[0], place) if counted > 0 else 1.0
+        if counted > 0:  # the certificate looks for the planes' multipliers here
+            first = 7 if case.on_ellipsoid else 6
+            for c in range(counted):
+                single.point.multiplier[first + c] = single.point.multiplier[plan.first_plane + c]
+        bound = max(
+            bound,
+            certified_thrust_level(
+                case,
+                single.target,
+                tube,
+                arc_bound,
+                single.model,
+                single.point.multiplier,
+                single.point.cone_dual,
+                single.duals,
+                single.cuts,
+                counted,
+                level,
+            ),
         )
-        if (
-            iteration > DEFECT_PERIOD
-            and primal < TOLERANCE
-            and dual < DUAL_TOLERANCE * scale
-            and gap < GAP_TOLERANCE * scale
-        ):
-            status = CONVERGED
-            break
-        if (prove or not plan.tau_free) and iteration >= FIRST_CERTIFICATE:
-            bound = max(bound, _certificate(case, target, tube, arc_bound, plan, planes, solver))
-            if bound > 1.0:
-                status = CERTIFIED
-                break
-            if (
-                not plan.tau_free
-                and iteration >= FIRST_BLOCKED
-                and linearised_thrust_level(case, plan, point, model, solver.duals) > BLOCKED_LEVEL
-            ):
-                status = BLOCKED
-                break
-        if not math.isfinite(gap):
-            break
-        smallest = 0.1 * TOLERANCE * scale / (point.thrust.shape[0] + plan.n_cones + plan.n_rows)
-        advance(point, model, step, plan.n_equal, plan.n_rows, plan.n_cones, gap, smallest, plan.tau_free)
-    if plan.tau_free and status == CONVERGED:
-        bound = max(bound, _certificate(case, target, tube, arc_bound, plan, planes, solver))
-    return Outcome(status, iteration, energy, bound, mass_costate)
+        if bound > 1.0 and not converged:
+            status = CERTIFIED
+    if status < 0 and blocks:
+        needed = linearised_thrust_level(case, plan, single.point, single.model, single.duals)
+        if needed > BLOCKED_LEVEL:
+            status = BLOCKED
+    if status < 0 and (iteration >= limit or not math.isfinite(numbers[GAP])):
+        status = STALLED
+    return Outcome(status, bound)
+
+
+@inner
+def linearise(case: ScaledCase, plan: Layout, solver: Solver) -> None:
+    """Linearise all lanes' problems anew and fill the solver's numbers; see their marks."""
+    point, model, path, marks, numbers = solver.point, solver.model, solver.path, solver.marks, solver.numbers
+    if any_lane(marks[NEW] > 0.0):
+        fill_constants(case, solver)
+    begins = marks[BEGINS] > 0.0
+    if any_lane(begins):
+        cold_start(case, plan, begins, solver)
+    measure_defect(case, point.thrust, path, marks[MEASURED] > 0.0)
+    retake = marks[RETAKEN] > 0.0
+    energy, mass_costate = refresh(case, solver.target, plan, solver.cuts, retake, point, path, model)
+    primal, dual, gap = residuals(
+        point, model, solver.step, plan.n_equal, plan.n_rows, plan.n_cones, plan.tau_free
+    )
+    scale = 1.0 if plan.tau_free else plan.energy_weight
+    size = 1.0 * (point.thrust.shape[0] + plan.n_cones)
+    for r in range(plan.n_rows):
+        size += model.row_live[r]
+    numbers[PRIMAL], numbers[DUAL], numbers[GAP] = primal, dual, gap
+    numbers[ENERGY], numbers[MASS_COSTATE] = energy, mass_costate
+    numbers[LEAST_TARGET] = 0.1 * TOLERANCE * scale / size
+
+
+@inner
+def take_step(plan: Layout, solver: Solver) -> None:
+    """Move all lanes by one predictor-corrector step."""
+    gap, least = solver.numbers[GAP], solver.numbers[LEAST_TARGET]
+    point, model, step = solver.point, solver.model, solver.step
+    advance(point, model, step, plan.n_equal, plan.n_rows, plan.n_cones, gap, least, plan.tau_free)

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import numba
 import numpy as np
 
 from landing_cli.body.adjacency import mean_edge_m
@@ -19,23 +20,17 @@ from landing_cli.body.clearance import signed_distances_into
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.body.ray_cast import first_hits_into
 from landing_cli.compile_cache import is_cached
-from landing_cli.optimize.conic_ipm import advance, residuals
 from landing_cli.parallel.forks import share_out
 from landing_cli.reach.certificate import GravityBounds, certified_thrust_level, linearised_thrust_level
 from landing_cli.reach.delivery import deliver_many, new_deliveries
-from landing_cli.reach.descent_model import layout, refresh
+from landing_cli.reach.descent_model import layout
 from landing_cli.reach.ellipsoid_arcs import arc_cuts_many, freeze_many, lowest_levels, lowest_levels_between
-from landing_cli.reach.free_batch import (
-    keep_costates,
-    keep_pressure,
-    new_batch,
-    no_cuts,
-    no_walls,
-    solve_many,
-)
+from landing_cli.reach.free_batch import new_batch, no_cuts, no_walls, solve_many
 from landing_cli.reach.free_descent import PreparedCase, Surroundings, prepare, survey
-from landing_cli.reach.free_solve import Solver, cold_start, new_solver
+from landing_cli.reach.free_solve import LaneSolver, linearise, new_solver, take_step
 from landing_cli.reach.records import LandingCase
+
+_typeof: Any = numba.typeof
 
 PATIENCE_S, TICK_S = 60.0, 0.02  # of what waits for kernels that another process compiles
 
@@ -77,16 +72,7 @@ def compile_parts(case: LandingCase) -> None:
     )
     prepared = prepare(case, shared)
     # what the solve joins comes before it, so that it waits little; the longest first
-    parts = [
-        _flight,
-        _conic,
-        _certificates,
-        _answers,
-        _delivery,
-        _solve,
-        _ellipsoid_arcs,
-        lambda _: survey(case),
-    ]
+    parts = [_flight, _conic, _certificates, _delivery, _solve, _ellipsoid_arcs, lambda _: survey(case)]
     if case.descent == "extremal":
         parts.insert(0, _extremals)
     if case.terrain == "require":
@@ -99,42 +85,34 @@ def _bound(part: Callable[[PreparedCase], object], prepared: PreparedCase) -> Ca
     return lambda: part(prepared)
 
 
-def _solver(prepared: PreparedCase) -> Solver:
+def _solver(prepared: PreparedCase) -> LaneSolver:
     return new_solver(prepared.coarse)
+
+
+def _compile(kernel: Any, *arguments: object) -> None:
+    """Compile a kernel that Python cannot call."""
+    kernel.compile(tuple(_typeof(argument) for argument in arguments))
 
 
 def _conic(prepared: PreparedCase) -> None:
     """Interior-point iterations."""
-    solver = _solver(prepared)
-    point, model, step = solver.point, solver.model, solver.step
-    rows, cones = model.row_value.shape[0], model.cone_offset.shape[0]
-    advance(point, model, step, 6, rows, cones, 1.0, 1e-9, False)
-    residuals(point, model, step, 6, rows, cones, False)
+    _compile(take_step, layout(prepared.coarse, 0, 1.0, False), _solver(prepared).lanes)
 
 
 def _certificates(prepared: PreparedCase) -> None:
     """Bounds that prove a facet unreachable."""
-    solver, case, target = _solver(prepared), prepared.coarse, prepared.shared.normals[0]
-    point, model = solver.point, solver.model
-    linearised_thrust_level(case, layout(case, 0, 1.0, False, 1.0, 0), point, model, solver.duals)
-    multipliers = point.multiplier, point.cone_dual, solver.duals
-    certified_thrust_level(case, target, prepared.coarse_tube, 1.0, model, *multipliers, solver.cuts, 0, 1.0)
-
-
-def _answers(prepared: PreparedCase) -> None:
-    """What is kept of a solve's multipliers."""
-    solver, case = _solver(prepared), prepared.coarse
-    plan = layout(case, 0, 1.0, False, 1.0, 0)
-    keep_costates(case, plan, solver, 0.0, np.zeros(7))
-    keep_pressure(case, plan, solver, np.zeros(6))
+    single, case, target = _solver(prepared).single, prepared.coarse, prepared.shared.normals[0]
+    point, model = single.point, single.model
+    linearised_thrust_level(case, layout(case, 0, 1.0, False), point, model, single.duals)
+    multipliers = point.multiplier, point.cone_dual, single.duals
+    certified_thrust_level(case, target, prepared.coarse_tube, 1.0, model, *multipliers, single.cuts, 0, 1.0)
 
 
 def _flight(prepared: PreparedCase) -> None:
     """The linearised flight, gravity and constraints."""
-    case, solver, normal = prepared.coarse, _solver(prepared), prepared.shared.normals[0]
-    plan = layout(case, 0, 1.0, False, 1.0, 0)
-    cold_start(case, normal, normal, plan, solver)
-    refresh(case, normal, plan, solver.cuts, False, solver.point, solver.path, solver.model)
+    solver = _solver(prepared).lanes
+    plan = layout(prepared.coarse, 0, 1.0, False)
+    _compile(linearise, prepared.coarse, plan, solver)
 
 
 def _delivery(prepared: PreparedCase) -> None:
@@ -172,16 +150,7 @@ def _terrain(prepared: PreparedCase) -> None:
 
 def _solve(prepared: PreparedCase) -> None:
     """The whole solve, once the kernels that it links are compiled."""
-    linked = (
-        cold_start,
-        refresh,
-        advance,
-        residuals,
-        certified_thrust_level,
-        linearised_thrust_level,
-        keep_costates,
-        keep_pressure,
-    )
+    linked = (take_step, linearise, certified_thrust_level, linearised_thrust_level)
     patience = time.monotonic() + PATIENCE_S
     while not all(is_cached(kernel) for kernel in linked) and time.monotonic() < patience:
         time.sleep(TICK_S)

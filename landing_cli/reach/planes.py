@@ -10,31 +10,33 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import part
+from landing_cli.kernel import kernel, part
+from landing_cli.kernel_lanes import any_lane, at_rows, choose
 from landing_cli.kernel_record import by_reference
-from landing_cli.optimize.conic_records import Model
+from landing_cli.optimize.conic_records import Model, New
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal
-from landing_cli.reach.shooting import Path, pull_back
+from landing_cli.reach.shooting import Path
 
 Floats = NDArray[np.float64]
 
 
 @by_reference
 class Cuts(NamedTuple):
-    """Planes: first tangent planes of the ellipsoid, n . r >= level, then walls, n . r >= offset."""
+    """Planes n . r >= offset."""
 
-    node: NDArray[np.int64]  # (C,) of the descent; 0: a wall on the final arc
+    node: Floats  # (C,) whole numbers, of the descent; 0: a wall on the final arc
     normal: Floats  # (C, 3) solver axes
     fraction: Floats  # (C,) of the final arc's time-to-go
-    offset: Floats  # (C,) of walls
+    offset: Floats  # (C,) of a tangent plane: |xi| that it keeps
+    tangent: Floats  # (C,) 1: it touches the ellipsoid, or a multiple of it; 0: a wall
 
 
-def new_cuts(size: int) -> Cuts:
-    """Room for ``size`` cuts."""
-    return Cuts(np.zeros(size, dtype=np.int64), np.zeros((size, 3)), np.zeros(size), np.zeros(size))
+def new_cuts(size: int, new: New = np.zeros) -> Cuts:
+    """Room for ``size`` cuts, in arrays that ``new`` makes."""
+    return Cuts(new(size), new((size, 3)), new(size), new(size), new(size))
 
 
-@part
+@kernel
 def arc_weights(sigma: float, final_time: float) -> tuple[float, float, float, float, float, float]:
     """Weights of (a_e, a_s) in a*, in r - r_c, and in v at time-to-go sigma T.
 
@@ -54,17 +56,15 @@ def arc_weights(sigma: float, final_time: float) -> tuple[float, float, float, f
 
 
 @part
-def _refresh_on_arc(
-    case: ScaledCase, target: Floats, model: Model, cuts: Cuts, c: int, r: int, y: Floats
-) -> None:
-    """Row r: wall c, at a point of the final arc."""
-    n = cuts.normal[c]
-    _, _, r_e, r_s, _, _ = arc_weights(cuts.fraction[c], case.final_time)
-    value = -cuts.offset[c]
-    for i in range(3):
-        model.row_y[r, 1 + i], model.row_y[r, 4 + i] = r_e * n[i], r_s * n[i]
-        value += n[i] * (target[i] + r_e * y[1 + i] + r_s * y[4 + i])
-    model.row_value[r] = value
+def _retake(case: ScaledCase, path: Path, cuts: Cuts, c: int, which: bool) -> None:
+    """Move a tangent plane to the current position of its node."""
+    if not any_lane(which):
+        return
+    k, n = cuts.node[c], cuts.normal[c]
+    turn = at_rows(case.node_cos, k, 0), at_rows(case.node_sin, k, 0)
+    x, y, z = at_rows(path.position, k, 0), at_rows(path.position, k, 1), at_rows(path.position, k, 2)
+    a, b, d = ellipsoid_normal(case, turn[0], turn[1], x, y, z)
+    n[0], n[1], n[2] = choose(which, a, n[0]), choose(which, b, n[1]), choose(which, d, n[2])
 
 
 @part
@@ -75,12 +75,15 @@ def refresh_planes(
     model: Model,
     cuts: Cuts,
     first_row: int,
-    counts: tuple[int, int],
-    level: float,
+    count: int,
     retake: bool,
     y: Floats,
 ) -> None:
     """Fill the rows of tangent planes and walls.
+
+    To tell of a position at a node by the state at the end undoes `shooting.pull_back` between them, whose
+    map is symplectic: its inverse is made of its own levers. On the final arc, which is flown without thrust
+    nodes, a plane has a row in y instead.
 
     Parameters
     ----------
@@ -96,27 +99,32 @@ def refresh_planes(
         The planes.
     first_row : int
         Row of the first plane.
-    counts : (int, int)
-        Tangent planes, and walls.
-    level : float
-        |xi| that the tangent planes keep.
+    count : int
+        How many planes.
     retake : bool
         Move each tangent plane to the current position of its node.
     y : (7,) float
         Thrust level, acceleration at touchdown and at handover.
     """
-    n_cuts, n_walls = counts
-    for c in range(n_cuts + n_walls):
-        k, n, r, least = cuts.node[c], cuts.normal[c], first_row + c, level
-        model.row_y[r, :] = 0.0
+    for c in range(count):
+        r, k, n, row_y = first_row + c, cuts.node[c], cuts.normal[c], model.row_y[first_row + c]
+        _retake(case, path, cuts, c, retake & (cuts.tangent[c] > 0.0))
         model.row_end[r] = k
-        if k == 0:
-            _refresh_on_arc(case, target, model, cuts, c, r, y)
-            continue
-        x = path.position[k]
-        if c >= n_cuts:
-            least = cuts.offset[c]
-        elif retake:
-            n[0], n[1], n[2] = ellipsoid_normal(case, case.node_cos[k], case.node_sin[k], x[0], x[1], x[2])
-        model.row_value[r] = n[0] * x[0] + n[1] * x[1] + n[2] * x[2] - least
-        pull_back(path, k, n[0], n[1], n[2], 0.0, 0.0, 0.0, model.row_thrust[r])
+        flown, mix, x0 = k > 0.0, model.row_mix[r], at_rows(path.position, k, 0)
+        x1, x2 = at_rows(path.position, k, 1), at_rows(path.position, k, 2)
+        _, _, r_e, r_s, _, _ = arc_weights(cuts.fraction[c], case.final_time)
+        x0 = choose(flown, x0, target[0] + r_e * y[1] + r_s * y[4])
+        x1 = choose(flown, x1, target[1] + r_e * y[2] + r_s * y[5])
+        x2 = choose(flown, x2, target[2] + r_e * y[3] + r_s * y[6])
+        model.row_value[r] = n[0] * x0 + n[1] * x1 + n[2] * x2 - cuts.offset[c]
+        on_arc, row_y[0] = choose(flown, 0.0, 1.0), 0.0
+        for i in range(3):
+            row_y[1 + i], row_y[4 + i] = on_arc * r_e * n[i], on_arc * r_s * n[i]
+        for i in range(6):
+            by_end = 0.0
+            for j in range(3):
+                by_end += n[j] * at_rows(path.lever, k, 3 * i + j)
+            other = (i + 3) % 6
+            mix[other] = choose(flown, by_end if i >= 3 else -by_end, 0.0)
+        for b in range(6, mix.shape[0]):
+            mix[b] = 0.0

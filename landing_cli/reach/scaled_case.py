@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.body.gravity.field import GravityKind
-from landing_cli.body.gravity.kernels import acceleration, acceleration_and_gradient
 from landing_cli.kernel import part
+from landing_cli.kernel_lanes import choose
 from landing_cli.kernel_record import by_reference
+from landing_cli.reach.gravity_in_lanes import acceleration, acceleration_and_gradient
 from landing_cli.reach.records import LandingCase
 
 Floats = NDArray[np.float64]
@@ -102,9 +103,7 @@ def core_scale(case: ScaledCase, x: float, y: float, z: float) -> float:
     """Metres per unit of length, more where a body-frame point lies in the ellipsoid's core."""
     a, b, c = x * case.inverse_axes[0], y * case.inverse_axes[1], z * case.inverse_axes[2]
     level = a * a + b * b + c * c
-    if level >= CORE * CORE:
-        return case.length_m
-    return case.length_m * CORE / math.sqrt(level + 1e-30)
+    return case.length_m * choose(level >= CORE * CORE, 1.0, CORE / math.sqrt(level + 1e-30))
 
 
 @part
@@ -171,9 +170,8 @@ def ellipsoid_level(case: ScaledCase, cosine: float, sine: float, x: float, y: f
 def least_between(first: float, middle: float, last: float) -> float:
     """Least value of the parabola through three evenly spaced values, between the outer two."""
     slope, bend = 0.5 * (last - first), 0.5 * (first + last) - middle
-    if bend > 0.0 and abs(slope) < 2.0 * bend:
-        return middle - slope * slope / (4.0 * bend)
-    return min(first, middle, last)
+    dips = (bend > 0.0) & (abs(slope) < 2.0 * bend)
+    return choose(dips, middle - slope * slope / (4.0 * bend), min(min(first, middle), last))
 
 
 @part

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.flight.astronomy import DAY_S
-from landing_cli.kernel import kernel, part
+from landing_cli.kernel import part
 from landing_cli.tour.chain_kernel import Bounds, FirstLegs, Scratch, chain_cost
 from landing_cli.tour.ephemeris import Ephemeris
 
@@ -21,7 +21,7 @@ _FIRST_STEP_S = 0.05 * DAY_S
 _HALVINGS = 25
 
 
-@kernel
+@part
 def improve_dates(
     dates: FloatArray,
     length: int,

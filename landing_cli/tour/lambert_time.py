@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from landing_cli.kernel import kernel, part
+from landing_cli.kernel import part
 
 _STEP = 1e-6  # the iteration is of order 4
 _ITERATIONS = 25
@@ -21,7 +21,7 @@ _SERIES_BELOW = 0.1
 _PARABOLIC = 1e-5
 
 
-@kernel
+@part
 def time_of_flight(lam: float, rest: float, turns: int, x: float) -> float:
     """Dimensionless time of flight T(x) (Izzo 2015, eqs 18-20).
 

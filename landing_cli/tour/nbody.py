@@ -104,7 +104,7 @@ def _collocate(
     return False
 
 
-@kernel
+@part
 def _growth(scheme: Radau, tolerance: float, rounding: float, forces: FloatArray) -> float:
     """How much longer the next step may be (Rein and Spiegel 2015, eq 11), at most fourfold."""
     size = highest = weights = 0.0

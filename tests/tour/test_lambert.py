@@ -14,8 +14,10 @@ from landing_cli.tour.lambert import lambert_arcs, solve_lambert
 from landing_cli.tour.lambert_time import (
     least_time as least_time_part,
     solve_x as solve_x_part,
-    time_of_flight,
+    time_of_flight as time_of_flight_part,
 )
+
+time_of_flight = from_python(time_of_flight_part)
 
 least_time = from_python(least_time_part)
 solve_x = from_python(solve_x_part)

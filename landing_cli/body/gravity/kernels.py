@@ -20,7 +20,7 @@ _acceleration_and_gradient: Any = models.called(models.ACCELERATION_AND_GRADIENT
 _curvature: Any = models.called(models.CURVATURE)
 
 
-@kernel
+@part
 def potential(kind: GravityKind, params: Params, x: float, y: float, z: float) -> float:
     """Return the potential U, m2/s2, positive (GM/r + ...)."""
     return _potential(kind, params, x, y, z)
@@ -40,14 +40,14 @@ def acceleration_and_gradient(
     return _acceleration_and_gradient(kind, params, x, y, z)
 
 
-@kernel
+@part
 def gradient(kind: GravityKind, params: Params, x: float, y: float, z: float) -> Symmetric:
     """Return the acceleration's gradient (gxx, gyy, gzz, gxy, gxz, gyz), 1/s2: the Hessian of U."""
     g = acceleration_and_gradient(kind, params, x, y, z)
     return g[3], g[4], g[5], g[6], g[7], g[8]
 
 
-@kernel
+@part
 def curvature(
     kind: GravityKind, params: Params, x: float, y: float, z: float, lx: float, ly: float, lz: float
 ) -> Symmetric:
