@@ -2,7 +2,8 @@
 
 To a kernel, an element of a ``LaneArray`` is WIDTH numbers, one a lane, on which arithmetic and comparisons
 work lane by lane. Kernels that are written with :func:`choose` where they would branch take plain numbers and
-lanes alike. No operation mixes lanes, so what comes out of one does not depend on the others.
+lanes alike. No operation mixes lanes, so what comes out of one does not depend on the others. Products and
+sums are rounded one by one, as plain numbers are: fused, they would depend on how a compiler arranges code.
 """
 
 from __future__ import annotations
@@ -29,8 +30,6 @@ _signature: Any = templates.signature
 _infer_global: Any = templates.infer_global
 
 WIDTH = 4
-# A product and a sum that takes it may be rounded once, as one operation.
-_FLAGS = ("contract",)
 _ALIGNMENT = 64
 
 _real = _types.float64
@@ -146,9 +145,9 @@ def _call(name: str) -> Any:
 
 
 for _function, _name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
-    _operation(_function, lanes, lambda b, x, y, name=_name: getattr(b, name)(x, y, flags=_FLAGS))
+    _operation(_function, lanes, lambda b, x, y, name=_name: getattr(b, name)(x, y))
     _inplace = getattr(operator, "i" + _function.__name__)
-    _operation(_inplace, lanes, lambda b, x, y, name=_name: getattr(b, name)(x, y, flags=_FLAGS))
+    _operation(_inplace, lanes, lambda b, x, y, name=_name: getattr(b, name)(x, y))
 _operation(operator.truediv, lanes, lambda b, x, y: b.fdiv(x, y))
 _operation(operator.itruediv, lanes, lambda b, x, y: b.fdiv(x, y))
 _operation(operator.neg, lanes, lambda b, x: b.fneg(x), 1)
