@@ -25,6 +25,7 @@ class Agreement:
     worst: float = 1e-2
     best: float = -1e-4  # a coarser control cannot cost less, beyond the truth's own error
     level: float = 4e-3
+    energies: bool = True  # whether the truth says them
 
 
 TABLES = {
@@ -37,6 +38,9 @@ TABLES = {
     "bacchus": Agreement(28),
     # one facet, stopped by the ellipsoid, passes it on another side: its level is 0.081 too high; others 4e-4
     "bacchus_boundary": Agreement(60, p99=1e-3, worst=2e-3, level=9e-2),
+    # under the polyhedron itself; the solver flies in the field that is fitted to it
+    "eros_boundary": Agreement(17, level=9e-2, energies=False),
+    "eros_boundary_broadside": Agreement(24, level=9e-2, energies=False),
     # far beyond the boundary the least level found lies above the truth's; the verdict is the same
     "eros_flown_mass": Agreement(24, p99=6e-3, best=-1e-3, level=0.3),
     # keeps the handover's mass on the long final stage, which costs it up to 0.4 % of thrust, and 4 % of J
@@ -78,7 +82,7 @@ def test_a_table_has_the_facets_it_is_said_to_have(table: str) -> None:
     a = answers(table)
     assert len(a.rows) >= TABLES[table].facets
     assert np.isfinite(a.tau).all()
-    assert np.isfinite(a.j[a.tau < 1.0 - TAU_BAND]).all()
+    assert not TABLES[table].energies or np.isfinite(a.j[a.tau < 1.0 - TAU_BAND]).all()
 
 
 def test_the_tables_cover_the_boundary_and_the_ellipsoid() -> None:
@@ -125,7 +129,7 @@ def with_known_faults(table: str):
     return pytest.param(table, marks=marks)
 
 
-@pytest.mark.parametrize("table", [with_known_faults(table) for table in TABLES])
+@pytest.mark.parametrize("table", [with_known_faults(table) for table in TABLES if TABLES[table].energies])
 def test_energies_agree(table: str) -> None:
     a, limit = answers(table), TABLES[table]
     both = (a.rows["verdict"] == Verdict.REACHABLE) & np.isfinite(a.j)
