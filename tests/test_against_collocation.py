@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from truth.tables import landing_case, read_table
+from truth.tables import is_fitted, landing_case, read_table
 
 from landing_cli.reach.free_descent import solve_facets
 from landing_cli.reach.records import Verdict
@@ -63,6 +63,8 @@ class Answers:
 @lru_cache
 def answers(table: str) -> Answers:
     cases = read_table(table)
+    if not all(is_fitted(truth.inputs["gravity"]) for truth in cases):
+        pytest.skip("its field is not fitted yet: reach run eros.yaml --set body.gravity.model=interpolated")
     rows = [solve_facets(*landing_case(truth)).rows for truth in cases]
     return Answers(
         np.concatenate([c.tau for c in cases]),

@@ -152,7 +152,7 @@ def run(
     """
     watch = Stopwatch()
     reach = reach_section(loaded)
-    built = build(loaded)
+    built = build(loaded, say)
     command = "reach run --compare" if options.compare else "reach run"
     identity = RunIdentity(
         command,

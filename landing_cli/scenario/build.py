@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -40,6 +41,9 @@ from landing_cli.sources.shape_search import find_shape
 # Of the semi-axes that hold the body: gravity models may have their masses not far inside.
 SMALLEST_SHARE = 0.7
 LIGHTEST_KG_M3, HEAVIEST_KG_M3 = 10.0, 20_000.0
+FITTING = "fitting a field to the polyhedron (once for a shape; about a minute)"
+
+Say: TypeAlias = Callable[[str], None]
 
 
 class KeyRefused(InputRefused):
@@ -85,13 +89,15 @@ class Surface:
     sha256: str
 
 
-def build(loaded: LoadedScenario) -> Built:
+def build(loaded: LoadedScenario, say: Say = lambda _: None) -> Built:
     """Make everything that a scenario describes.
 
     Parameters
     ----------
     loaded : LoadedScenario
         As `landing_cli.scenario.load.load` returns it.
+    say : callable
+        Told one line when something takes a while.
 
     Returns
     -------
@@ -102,7 +108,7 @@ def build(loaded: LoadedScenario) -> Built:
     InputRefused
         A value contradicts the mesh; it is named with its file, line and dotted key.
     """
-    return builder_over(read_surface(loaded))(loaded)
+    return builder_over(read_surface(loaded), say)(loaded)
 
 
 def read_surface(loaded: LoadedScenario) -> Surface:
@@ -128,13 +134,15 @@ def read_surface(loaded: LoadedScenario) -> Surface:
         raise _refused(error, loaded) from error
 
 
-def builder_over(surface: Surface) -> Callable[[LoadedScenario], Built]:
+def builder_over(surface: Surface, say: Say = lambda _: None) -> Callable[[LoadedScenario], Built]:
     """Return what builds scenarios over one surface; equal bodies and ellipsoids are made once.
 
     Parameters
     ----------
     surface : Surface
         What the scenarios' ``body.shape``, ``length_unit`` and ``origin`` stand for.
+    say : callable
+        Told one line when something takes a while.
 
     Returns
     -------
@@ -149,7 +157,7 @@ def builder_over(surface: Surface) -> Callable[[LoadedScenario], Built]:
         body, about = scenario.name + scenario.body.model_dump_json(), _of_ellipsoid(reach)
         try:
             if body not in bodies:
-                bodies[body] = asteroid_over(scenario, surface.mesh)
+                bodies[body] = asteroid_over(scenario, surface.mesh, say)
             if reach is not None and about not in ellipsoids:
                 ellipsoids[about] = resolve_ellipsoid(reach, surface.mesh)
         except KeyRefused as error:
@@ -198,7 +206,7 @@ def build_asteroid(scenario: Scenario, beside: Path) -> tuple[Asteroid, str]:
     return asteroid_over(scenario, surface.mesh), surface.sha256
 
 
-def asteroid_over(scenario: Scenario, mesh: Mesh) -> Asteroid:
+def asteroid_over(scenario: Scenario, mesh: Mesh, say: Say = lambda _: None) -> Asteroid:
     """Make the asteroid of a scenario over a surface that was read already.
 
     Parameters
@@ -207,6 +215,8 @@ def asteroid_over(scenario: Scenario, mesh: Mesh) -> Asteroid:
         Its ``body`` section says spin and gravity.
     mesh : Mesh
         About the scenario's origin.
+    say : callable
+        Told one line when something takes a while.
 
     Returns
     -------
@@ -219,7 +229,7 @@ def asteroid_over(scenario: Scenario, mesh: Mesh) -> Asteroid:
     """
     body = scenario.body
     gm_m3_s2 = _gravitational_parameter(body.gravity, mass_properties(mesh).volume_m3)
-    gravity = _gravity_field(body.gravity, gm_m3_s2, mesh)
+    gravity = _gravity_field(body.gravity, gm_m3_s2, mesh, say)
     return Asteroid(scenario.name, mesh, body.spin_rad_s, gravity, gm_m3_s2)
 
 
@@ -295,7 +305,7 @@ def _gravitational_parameter(gravity: AnyGravity, volume_m3: float) -> float:
     return gravity.gm_m3_s2
 
 
-def _gravity_field(gravity: AnyGravity, gm_m3_s2: float, mesh: Mesh) -> GravityField:
+def _gravity_field(gravity: AnyGravity, gm_m3_s2: float, mesh: Mesh, say: Say) -> GravityField:
     if isinstance(gravity, PointMassGravity):
         return point_mass_field(gm_m3_s2)
     if isinstance(gravity, HarmonicsGravity):
@@ -303,13 +313,14 @@ def _gravity_field(gravity: AnyGravity, gm_m3_s2: float, mesh: Mesh) -> GravityF
     if isinstance(gravity, DipoleGravity):
         return _dipole(gravity, gm_m3_s2, mesh)
     if isinstance(gravity, InterpolatedGravity):
-        return _interpolated(gm_m3_s2, mesh)
+        return _interpolated(gm_m3_s2, mesh, say)
     return polyhedron_field(mesh.vertices, mesh.faces, gm_m3_s2)
 
 
-def _interpolated(gm_m3_s2: float, mesh: Mesh) -> GravityField:
+def _interpolated(gm_m3_s2: float, mesh: Mesh, say: Say) -> GravityField:
     try:
-        return scaled_field(kept_interpolation(mesh.vertices, mesh.faces), gm_m3_s2)
+        field = kept_interpolation(mesh.vertices, mesh.faces, lambda: say(FITTING))
+        return scaled_field(field, gm_m3_s2)
     except InputRefused as error:
         raise KeyRefused(("body", "gravity", "model"), error.what, error.fix) from error
 

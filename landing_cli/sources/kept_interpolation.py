@@ -10,7 +10,7 @@ import contextlib
 import hashlib
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -53,7 +53,9 @@ _SUFFIX = ".field"
 _DIGEST = hashlib.sha256().digest_size
 
 
-def kept_interpolation(vertices: ArrayLike, faces: ArrayLike) -> GravityField:
+def kept_interpolation(
+    vertices: ArrayLike, faces: ArrayLike, before_fit: Callable[[], None] = lambda: None
+) -> GravityField:
     """Return the field fitted to a polyhedron of GM = 1 m3/s2.
 
     Parameters
@@ -62,6 +64,8 @@ def kept_interpolation(vertices: ArrayLike, faces: ArrayLike) -> GravityField:
         As ``polyhedron_field`` takes them.
     faces : (m, 3) int
         0-based vertex indices, counter-clockwise seen from outside.
+    before_fit : callable
+        Called before what takes a minute, where it is not kept.
 
     Returns
     -------
@@ -78,10 +82,16 @@ def kept_interpolation(vertices: ArrayLike, faces: ArrayLike) -> GravityField:
     folder, name = cache_folder(), _name(exact) + _SUFFIX
     params = _read(folder / name)
     if params is None:
+        before_fit()
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             params = surrounding.surrounding_field(exact, pool.map).field.params
         _keep(folder, name, params)
     return GravityField(GravityKind.INTERPOLATED, params)
+
+
+def is_kept(vertices: ArrayLike, faces: ArrayLike) -> bool:
+    """Tell whether a polyhedron's field was fitted before, by this version for this kind of processor."""
+    return (cache_folder() / (_name(polyhedron_field(vertices, faces, 1.0)) + _SUFFIX)).exists()
 
 
 def cache_folder() -> Path:

@@ -23,7 +23,7 @@ from landing_cli.body.mass_properties import centred
 from landing_cli.body.mesh import Mesh
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.reach.records import LandingCase
-from landing_cli.sources.kept_interpolation import kept_interpolation
+from landing_cli.sources.kept_interpolation import is_kept, kept_interpolation
 from landing_cli.sources.shape_files import read_shape
 
 HERE = Path(__file__).resolve().parent
@@ -121,6 +121,14 @@ def gravity_field(gravity: list[Any]) -> GravityField:
     if kind == "polyhedron":
         return interpolated(numbers[0], *numbers[-2:])
     return {"harmonics": harmonics_field, "dipole": dipole_field}[kind](*numbers)
+
+
+def is_fitted(gravity: list[Any]) -> bool:
+    """Whether the package's field for a header's gravity takes no minute to make."""
+    if gravity[0] != "polyhedron":
+        return True
+    mesh = centred(read_shape(SHAPES / gravity[-2], "km").mesh)
+    return is_kept(mesh.vertices, mesh.faces)
 
 
 @lru_cache(maxsize=1)

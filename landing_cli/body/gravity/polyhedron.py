@@ -283,7 +283,7 @@ def laplacian(params: Params, x: float, y: float, z: float) -> float:
     return -4.0 * math.pi * params[2] * inside_share(params, x, y, z)
 
 
-@part
+@kernel
 def inside_share(params: Params, x: float, y: float, z: float) -> float:
     """Return the solid angle that the surface fills, over 4 pi: 0 outside, 1 inside, between on a facet."""
     twos, facets = int(params[0]), int(params[0]) + int(params[1])

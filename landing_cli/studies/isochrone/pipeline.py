@@ -122,7 +122,7 @@ def run(
     """
     watch = Stopwatch()
     reach = fixed_stage_reach(loaded, COMMAND)
-    built = build(loaded)
+    built = build(loaded, say)
     states = states_of(reach, built)
     grid = grid_of(loaded, states)
     identity = RunIdentity(
