@@ -214,6 +214,7 @@ def _catch_signals() -> None:
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
     for number in _SIGNALS:
         signal.signal(number, _on_signal)
+    sys.unraisablehook = _tell_unraisable
     threading.Thread(target=_watch, args=(reading,), daemon=True, name="signal watchdog").start()
 
 
@@ -221,6 +222,12 @@ def _on_signal(number: int, frame: object) -> None:
     for caught in _SIGNALS:  # one is enough: a second must not cut the first one's clean-up short
         signal.signal(caught, signal.SIG_IGN)
     raise Interrupted(number)
+
+
+def _tell_unraisable(raised: sys.UnraisableHookArgs) -> None:
+    """Show what could not be raised (in a destructor, say), but an interruption: the watchdog ends that."""
+    if not isinstance(raised.exc_value, Interrupted):
+        sys.__unraisablehook__(raised)
 
 
 def _watch(descriptor: int) -> None:
