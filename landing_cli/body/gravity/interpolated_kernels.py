@@ -6,6 +6,7 @@ The parameters are where the polyhedron's own begin and where the coefficients b
 
 from __future__ import annotations
 
+from landing_cli.body.gravity.horner import polynomial_gradient
 from landing_cli.body.gravity.kernel_types import Params, Symmetric, Vector, VectorAndSymmetric
 from landing_cli.body.gravity.polyhedron import (
     polyhedron_acceleration,
@@ -57,35 +58,9 @@ def _fitted_values(params: Params, x: float, y: float, z: float) -> Fitted:
         return nothing
     px, py, pz = px / hx, py / hy, pz / hz
     c = int(params[1]) + (-node - 1) * PER_PIECE
-    # value and derivatives, second ones halved along one axis; f_xy is named fxy
-    f = fx = fy = fz = fxx = fyy = fzz = fxy = fxz = fyz = 0.0
-    for i in range(DEGREE + 1):
-        q = qy = qz = qyy = qzz = qyz = 0.0
-        for j in range(i + 1):
-            s = sz = szz = 0.0
-            for _ in range(j + 1):
-                szz = szz * pz + sz
-                sz = sz * pz + s
-                s = s * pz + params[c]
-                c += 1
-            qyy = qyy * py + qy
-            qyz = qyz * py + qz
-            qy = qy * py + q
-            qzz = qzz * py + szz
-            qz = qz * py + sz
-            q = q * py + s
-        fxx = fxx * px + fx
-        fxy = fxy * px + fy
-        fxz = fxz * px + fz
-        fx = fx * px + f
-        fyy = fyy * px + qyy
-        fyz = fyz * px + qyz
-        fzz = fzz * px + qzz
-        fy = fy * px + qy
-        fz = fz * px + qz
-        f = f * px + q
+    f, fx, fy, fz, fxx, fyy, fzz, fxy, fxz, fyz = polynomial_gradient(params, c, DEGREE, px, py, pz)
     fx, fy, fz = fx / hx, fy / hy, fz / hz
-    fxx, fyy, fzz = 2.0 * fxx / (hx * hx), 2.0 * fyy / (hy * hy), 2.0 * fzz / (hz * hz)
+    fxx, fyy, fzz = fxx / (hx * hx), fyy / (hy * hy), fzz / (hz * hz)
     fxy, fxz, fyz = fxy / (hx * hy), fxz / (hx * hz), fyz / (hy * hz)
     # columns of (gradient times axes), then axes' times those
     ax = fxx * a[0] + fxy * a[3] + fxz * a[6]

@@ -18,6 +18,7 @@ import math
 from typing import Any
 
 from landing_cli.body.gravity.facet_potential import facet_curvature, facet_gradient, facet_pull
+from landing_cli.body.gravity.horner import polynomial_gradient, polynomial_pull
 from landing_cli.body.gravity.kernel_types import Params, Symmetric, Vector, VectorAndSymmetric
 from landing_cli.body.gravity.point_mass import point_acceleration_and_gradient, point_curvature
 from landing_cli.body.gravity.polyhedron import (
@@ -67,69 +68,12 @@ def _degree(params: Params, c: int) -> int:
 
 
 @part
-def _polynomial_pull(params: Params, c: int, degree: int, px: Any, py: Any, pz: Any) -> Any:
-    """Return the polynomial whose coefficients begin at ``c``, and its gradient; also at complex points."""
-    zero = 0.0 * px
-    f = fx = fy = fz = zero
-    for i in range(degree + 1):
-        q = qy = qz = zero
-        for j in range(i + 1):
-            s = sz = zero
-            for _ in range(j + 1):
-                sz = sz * pz + s
-                s = s * pz + params[c]
-                c += 1
-            qy = qy * py + q
-            qz = qz * py + sz
-            q = q * py + s
-        fx = fx * px + f
-        fy = fy * px + qy
-        fz = fz * px + qz
-        f = f * px + q
-    return f, fx, fy, fz
-
-
-@part
-def polynomial_gradient(params: Params, c: int, degree: int, px: Any, py: Any, pz: Any) -> Any:
-    """Return its gradient and Hessian (xx, yy, zz, xy, xz, yz)."""
-    zero = 0.0 * px
-    # second derivatives along one axis are halved; f_xy is named fxy
-    f = fx = fy = fz = fxx = fyy = fzz = fxy = fxz = fyz = zero
-    for i in range(degree + 1):
-        q = qy = qz = qyy = qzz = qyz = zero
-        for j in range(i + 1):
-            s = sz = szz = zero
-            for _ in range(j + 1):
-                szz = szz * pz + sz
-                sz = sz * pz + s
-                s = s * pz + params[c]
-                c += 1
-            qyy = qyy * py + qy
-            qyz = qyz * py + qz
-            qy = qy * py + q
-            qzz = qzz * py + szz
-            qz = qz * py + sz
-            q = q * py + s
-        fxx = fxx * px + fx
-        fxy = fxy * px + fy
-        fxz = fxz * px + fz
-        fx = fx * px + f
-        fyy = fyy * px + qyy
-        fyz = fyz * px + qyz
-        fzz = fzz * px + qzz
-        fy = fy * px + qy
-        fz = fz * px + qz
-        f = f * px + q
-    return fx, fy, fz, 2.0 * fxx, 2.0 * fyy, 2.0 * fzz, fxy, fxz, fyz
-
-
-@part
 def _outer_pull(params: Params, x: Any, y: Any, z: Any) -> Any:
     """Return U beyond the radius, and its gradient; complex at a complex point."""
     d = params[_OUTER]
     inverse = 1.0 / (x * x + y * y + z * z)
     s, k = d * inverse, d * (inverse**0.5)
-    f, fx, fy, fz = _polynomial_pull(params, int(params[1]), OUTER_DEGREE, s * x, s * y, s * z)
+    f, fx, fy, fz = polynomial_pull(params, int(params[1]), OUTER_DEGREE, s * x, s * y, s * z)
     along = 2.0 * (x * fx + y * fy + z * fz) * inverse
     fall = k * (f * inverse + s * along)
     return k * f, k * s * fx - fall * x, k * s * fy - fall * y, k * s * fz - fall * z
@@ -195,7 +139,7 @@ def surrounding_potential(params: Params, x: float, y: float, z: float) -> float
         return polyhedron_potential(params[int(params[0]) :], x, y, z)
     return (
         _pull(params, c, x, y, z)[0]
-        + _polynomial_pull(params, int(params[c]), _degree(params, c), px, py, pz)[0]
+        + polynomial_pull(params, int(params[c]), _degree(params, c), px, py, pz)[0]
     )
 
 
@@ -208,7 +152,7 @@ def surrounding_acceleration(params: Params, x: float, y: float, z: float) -> Ve
     if c == 0:
         return polyhedron_acceleration(params[int(params[0]) :], x, y, z)
     _u, gx, gy, gz = _pull(params, c, x, y, z)
-    _f, fx, fy, fz = _polynomial_pull(params, int(params[c]), _degree(params, c), px, py, pz)
+    _f, fx, fy, fz = polynomial_pull(params, int(params[c]), _degree(params, c), px, py, pz)
     return gx + fx / h, gy + fy / h, gz + fz / h
 
 
@@ -239,15 +183,15 @@ def surrounding_acceleration_and_gradient(params: Params, x: float, y: float, z:
         m = 1.0  # no facet is near
         gx, gy, gz, xx, yy, zz, xy, xz, yz = point_acceleration_and_gradient(params[GM], x, y, z)
     return (
-        m * gx + p * f[0],
-        m * gy + p * f[1],
-        m * gz + p * f[2],
-        m * xx + q * f[3],
-        m * yy + q * f[4],
-        m * zz + q * f[5],
-        m * xy + q * f[6],
-        m * xz + q * f[7],
-        m * yz + q * f[8],
+        m * gx + p * f[1],
+        m * gy + p * f[2],
+        m * gz + p * f[3],
+        m * xx + q * f[4],
+        m * yy + q * f[5],
+        m * zz + q * f[6],
+        m * xy + q * f[7],
+        m * xz + q * f[8],
+        m * yz + q * f[9],
     )
 
 
@@ -283,10 +227,10 @@ def surrounding_curvature(
         m = 1.0  # no facet is near
         xx, yy, zz, xy, xz, yz = point_curvature(params[GM], x, y, z, lx, ly, lz)
     return (
-        m * xx + q * f[3].imag,
-        m * yy + q * f[4].imag,
-        m * zz + q * f[5].imag,
-        m * xy + q * f[6].imag,
-        m * xz + q * f[7].imag,
-        m * yz + q * f[8].imag,
+        m * xx + q * f[4].imag,
+        m * yy + q * f[5].imag,
+        m * zz + q * f[6].imag,
+        m * xy + q * f[7].imag,
+        m * xz + q * f[8].imag,
+        m * yz + q * f[9].imag,
     )
