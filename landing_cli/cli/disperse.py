@@ -100,7 +100,7 @@ def disperse(
     if dry_run:
         from landing_cli.studies.disperse.request import request_of
 
-        _say_plan(request_of(loaded), path, as_json)
+        _say_plan(request_of(loaded, say=voice.say), path, as_json)
         return
     from landing_cli.studies.disperse.pipeline import RunOptions, run as run_dispersion
 

@@ -210,7 +210,7 @@ def _request(scenario: str, overrides: Sequence[str], voice: console.Console) ->
     section = observe_section(loaded)  # before the solvers are imported
     from landing_cli.observe.pipeline import request_of
 
-    request = request_of(loaded)
+    request = request_of(loaded, voice.say)
     if section.sensor.kind == "camera" and request.case.sun_direction is None:
         voice.say(
             "illumination is off: the scenario says neither body.sun_direction nor body.orbit "

@@ -86,7 +86,7 @@ def request_of_source(command: str, source: Source, voice: Console) -> Request:
     loaded = load(source.scenario, overrides)
     voice.say(f"read {loaded.source}")
     plan_section(loaded)  # before the shape is read
-    return request_of(command, loaded)
+    return request_of(command, loaded, voice.say)
 
 
 def site_override(text: str, section: str = "plan") -> str:

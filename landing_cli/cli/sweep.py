@@ -73,7 +73,7 @@ def sweep(
     from landing_cli.studies.sweep.pipeline import RunOptions, grid_of, run as run_sweep
 
     voice = console.Console(quiet)
-    grid = grid_of(scenario, overrides or (), over or ())
+    grid = grid_of(scenario, overrides or (), over or (), voice.say)
     voice.say(f"read {grid.question.source}")
     voice.say(_size(grid))
     path = output or Path("runs") / f"{grid.first.scenario.name}-reach-sweep.h5"

@@ -89,13 +89,15 @@ class Outcome:
     lost: dict[str, str]
 
 
-def request_of(loaded: LoadedScenario) -> Request:
+def request_of(loaded: LoadedScenario, say: Callable[[str], None] = lambda _: None) -> Request:
     """Make a request of a scenario file.
 
     Parameters
     ----------
     loaded : LoadedScenario
         The checked scenario, with what the command line says written into it.
+    say : callable
+        Told one line when something takes a while.
 
     Returns
     -------
@@ -108,7 +110,7 @@ def request_of(loaded: LoadedScenario) -> Request:
     """
     observe_section(loaded)  # before the shape is read
     own = with_landmarks_hash(replace(loaded, scenario=for_mission(loaded.scenario, MISSION)))
-    built = build(own)
+    built = build(own, say)
     case = observe_case(own, built.asteroid, built.spacecraft)
     return Request(own, case, tasks_of(observe_section(own)), built.shape_sha256)
 

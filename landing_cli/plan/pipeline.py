@@ -86,7 +86,7 @@ class Outcome:
     lost: dict[str, str]
 
 
-def request_of(command: str, loaded: LoadedScenario) -> Request:
+def request_of(command: str, loaded: LoadedScenario, say: Callable[[str], None] = lambda _: None) -> Request:
     """Make a request of a scenario file.
 
     Parameters
@@ -95,6 +95,8 @@ def request_of(command: str, loaded: LoadedScenario) -> Request:
         With every option that decides the numbers.
     loaded : LoadedScenario
         The checked scenario.
+    say : callable
+        Told one line when something takes a while.
 
     Returns
     -------
@@ -105,7 +107,7 @@ def request_of(command: str, loaded: LoadedScenario) -> Request:
     InputRefused
         The scenario contradicts its mesh.
     """
-    built = build(replace(loaded, scenario=for_mission(loaded.scenario, MISSION)))
+    built = build(replace(loaded, scenario=for_mission(loaded.scenario, MISSION)), say)
     return Request(command, loaded, built.asteroid, built.spacecraft, built.shape_sha256)
 
 

@@ -91,7 +91,7 @@ def run(
         The scenario contradicts itself or its mesh, or the output is refused.
     """
     watch = Stopwatch()
-    request = request_of(loaded)
+    request = request_of(loaded, say=say)
     identity = RunIdentity(
         COMMAND,
         to_yaml(for_mission(loaded.scenario, "reach", "disperse")),

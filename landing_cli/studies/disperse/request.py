@@ -8,7 +8,7 @@ import numpy as np
 
 from landing_cli.reach.cases import landing_cases
 from landing_cli.reach.records import LandingCase
-from landing_cli.scenario.build import Built, build
+from landing_cli.scenario.build import Built, Say, build
 from landing_cli.scenario.load import LoadedScenario
 from landing_cli.scenario.messages import Problem, refusal
 from landing_cli.scenario.schema import Reach
@@ -40,7 +40,7 @@ class Request:
     drawing: Drawing
 
 
-def request_of(loaded: LoadedScenario, built: Built | None = None) -> Request:
+def request_of(loaded: LoadedScenario, built: Built | None = None, say: Say = lambda _: None) -> Request:
     """Make what a scenario asks for.
 
     Parameters
@@ -49,6 +49,8 @@ def request_of(loaded: LoadedScenario, built: Built | None = None) -> Request:
         The checked scenario.
     built : Built, optional
         What it describes, where that was built already.
+    say : callable
+        Told one line when something takes a while.
 
     Returns
     -------
@@ -61,7 +63,7 @@ def request_of(loaded: LoadedScenario, built: Built | None = None) -> Request:
     """
     reach, section = fixed_stage_reach(loaded, "reach disperse"), disperse_section(loaded)
     chosen = _chosen(loaded, reach, section)
-    built = built or build(loaded)
+    built = built or build(loaded, say)
     spread = spread_of(section, built, loaded)
     cases = tuple(
         (name, replace(case, margin=False))

@@ -18,7 +18,7 @@ from landing_cli.body.asteroid import Asteroid
 from landing_cli.errors import InputRefused, UsageError
 from landing_cli.reach.cases import landing_cases
 from landing_cli.reach.records import LandingCase
-from landing_cli.scenario.build import Surface, builder_over, read_surface
+from landing_cli.scenario.build import Say, Surface, builder_over, read_surface
 from landing_cli.scenario.document import Document
 from landing_cli.scenario.load import LoadedScenario, load_document
 from landing_cli.scenario.schema import Scenario
@@ -100,6 +100,8 @@ class Grid:
     question : Question
     surface : Surface
         What all cells land on.
+    say : callable
+        Told one line when something takes a while.
     states : tuple of str
         Names of the initial states.
     cases : tuple of LandingCase
@@ -167,13 +169,15 @@ def ask(document: Document, source: str, beside: Path, axes: Sequence[Axis]) -> 
     return replace(question, document=_for_reach(document))
 
 
-def lay_out(question: Question) -> Grid:
+def lay_out(question: Question, say: Say = lambda _: None) -> Grid:
     """Load, check and build every cell of a sweep.
 
     Parameters
     ----------
     question : Question
         From :func:`ask`.
+    say : callable
+        Told one line when something takes a while.
 
     Returns
     -------
@@ -187,7 +191,7 @@ def lay_out(question: Question) -> Grid:
     """
     first = question.scenario_at(0)
     surface = read_surface(first)
-    make = case_maker(surface)
+    make = case_maker(surface, say)
     cases: list[LandingCase] = []
     for cell in range(question.cells):
         cases += make(question.scenario_at(cell))
@@ -196,20 +200,22 @@ def lay_out(question: Question) -> Grid:
     return Grid(question, surface, states, tuple(cases), first)
 
 
-def case_maker(surface: Surface) -> Callable[[LoadedScenario], list[LandingCase]]:
+def case_maker(surface: Surface, say: Say = lambda _: None) -> Callable[[LoadedScenario], list[LandingCase]]:
     """Return what makes the landing cases of a cell's scenario, one an initial state.
 
     Parameters
     ----------
     surface : Surface
         What all cells land on.
+    say : callable
+        Told one line when something takes a while.
 
     Returns
     -------
     callable
         From LoadedScenario to a list of LandingCase.
     """
-    build = builder_over(surface)
+    build = builder_over(surface, say)
 
     def make(loaded: LoadedScenario) -> list[LandingCase]:
         reach = reach_section(loaded)

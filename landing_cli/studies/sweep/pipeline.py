@@ -52,7 +52,12 @@ class Outcome:
     up_to_date: bool
 
 
-def grid_of(scenario: str, overrides: Sequence[str], over: Sequence[str]) -> Grid:
+def grid_of(
+    scenario: str,
+    overrides: Sequence[str],
+    over: Sequence[str],
+    say: Callable[[str], None] = lambda _: None,
+) -> Grid:
     """Make the grid that a command line asks for, every cell checked and built.
 
     Parameters
@@ -63,6 +68,8 @@ def grid_of(scenario: str, overrides: Sequence[str], over: Sequence[str]) -> Gri
         ``dotted.key=value`` each.
     over : sequence of str
         ``dotted.key=values`` each.
+    say : callable
+        Told one line when something takes a while.
 
     Returns
     -------
@@ -77,7 +84,7 @@ def grid_of(scenario: str, overrides: Sequence[str], over: Sequence[str]) -> Gri
         fix = "add --over reach.tof_s=600:1200:50, for instance"
         raise UsageError("a sweep needs an axis", where="--over", fix=fix)
     axes = [parse_axis(text) for text in over]
-    grid = lay_out(ask(*read_document(scenario, overrides), axes))
+    grid = lay_out(ask(*read_document(scenario, overrides), axes), say)
     if grid.solves > MOST_SOLVES:
         told = f"{len(grid.cases)} cases x {grid.facets} facets = {grid.solves} solves"
         fix = f"at most {MOST_SOLVES}: take longer steps, or a coarser shape"
