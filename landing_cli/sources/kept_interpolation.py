@@ -84,6 +84,7 @@ def kept_interpolation(
     folder, name = cache_folder(), _name(exact) + _SUFFIX
     params = _read(folder / name)
     if params is None:
+        surrounding.refuse_misfits(exact)
         before_fit()
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             params = surrounding.surrounding_field(exact, pool.map).field.params

@@ -17,6 +17,7 @@ from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.field_values import accelerations_and_gradients
 from landing_cli.body.gravity.fitted_pieces import probe_points
 from landing_cli.body.gravity.kernel_types import FloatArray
+from landing_cli.body.gravity.polyhedron_records import recorded_corners
 from landing_cli.body.gravity.surrounding_kernels import ERROR, HEADER
 from landing_cli.body.gravity.surrounding_pieces import (
     FINE,
@@ -64,6 +65,35 @@ class SurroundingField:
     near: float
 
 
+def refuse_misfits(polyhedron: GravityField) -> None:
+    """Refuse what no field is fitted to.
+
+    Parameters
+    ----------
+    polyhedron : GravityField
+        From ``polyhedron_field``.
+
+    Raises
+    ------
+    InputRefused
+        The field is no polyhedron's, or it has more than MOST_FACETS.
+    """
+    if polyhedron.kind is not GravityKind.POLYHEDRON:
+        name = polyhedron.kind.name.lower()
+        raise InputRefused(
+            f"a {name} field is not worth interpolating",
+            where="gravity",
+            fix="fly in it directly, or take a polyhedron",
+        )
+    facets = len(recorded_corners(polyhedron.params)) // 3
+    if facets > MOST_FACETS:
+        raise InputRefused(
+            f"{facets} facets are too many to fit a field to: at most {MOST_FACETS}",
+            where="gravity",
+            fix="resample the shape (landing shapes resample), or take another model",
+        )
+
+
 def surrounding_field(polyhedron: GravityField, mapped: Mapped = map) -> SurroundingField:
     """Interpolate a polyhedron's field around the body.
 
@@ -83,20 +113,8 @@ def surrounding_field(polyhedron: GravityField, mapped: Mapped = map) -> Surroun
     InputRefused
         The field is no polyhedron's, or it has more than MOST_FACETS.
     """
-    if polyhedron.kind is not GravityKind.POLYHEDRON:
-        name = polyhedron.kind.name.lower()
-        raise InputRefused(
-            f"a {name} field is not worth interpolating",
-            where="gravity",
-            fix="fly in it directly, or take a polyhedron",
-        )
+    refuse_misfits(polyhedron)
     body = Body.of(polyhedron)
-    if len(body.table) > MOST_FACETS:
-        raise InputRefused(
-            f"{len(body.table)} facets are too many to fit a field to: at most {MOST_FACETS}",
-            where="gravity",
-            fix="resample the shape (landing shapes resample), or take another model",
-        )
     least = FINE * body.size(body.every)
     outer = OUTER * body.radius_m
     half = least * 2.0 ** math.ceil(math.log2(outer / least))
