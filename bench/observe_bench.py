@@ -20,8 +20,8 @@ import numpy as np
 
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.bvh import build_surface_index
+from landing_cli.body.gravity.boxed import Box, boxed_field
 from landing_cli.body.gravity.field_values import accelerations
-from landing_cli.body.gravity.interpolated import Box, interpolated_field
 from landing_cli.body.gravity.polyhedron import polyhedron_field
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.flight.linear_arcs import frame_slopes
@@ -160,7 +160,7 @@ def main() -> None:
     box = box_of(case)
     print(f"{name}; CPU, kernels compiled and loaded; J over that in the polyhedron, and the miss there")
     least_energy_path(case, TOF, None, 20)
-    fit_s, fitted = cpu_s(lambda: interpolated_field(case.asteroid.gravity, box), 1)
+    fit_s, fitted = cpu_s(lambda: boxed_field(case.asteroid.gravity, box), 1)
     print(f"  interpolating {fit_s:.1f} s: {fitted.pieces} pieces, {fitted.error:.1e} of g at most")
     fast = replace(case, asteroid=replace(case.asteroid, gravity=fitted.field))
     table_s, spline = cpu_s(lambda: gravity_spline(case, box), 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from landing_cli.body.gravity.interpolated import Box
+from landing_cli.body.gravity.boxed import Box
 from landing_cli.observe.records import ObserveCase
 
 MARGIN = 0.5

@@ -240,10 +240,10 @@ def _solver_case(section: ObserveSection, case: ObserveCase) -> tuple[ObserveCas
     """Return the case in the field that the solvers fly in, and what is to be said of that field."""
     if section.gravity != "interpolated":
         return case, {"gravity": case.asteroid.gravity.kind.name.lower()}
-    from landing_cli.body.gravity.interpolated import interpolated_field
+    from landing_cli.body.gravity.boxed import boxed_field
     from landing_cli.observe.gravity_box import box_of
 
-    fitted = interpolated_field(case.asteroid.gravity, box_of(case))
+    fitted = boxed_field(case.asteroid.gravity, box_of(case))
     told: dict[str, Parameter] = {
         "gravity": "interpolated",
         "gravity_error_relative": fitted.error,

@@ -13,11 +13,11 @@ from landing_samples import GM_M3_S2, SPIN_RAD_S, asteroid, landing_case, rock
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import norm
 
+from landing_cli.body.gravity.boxed import Box, boxed_field
 from landing_cli.body.gravity.dipole import dipole_field
 from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.field_values import accelerations, gradients
 from landing_cli.body.gravity.harmonics import harmonics_field
-from landing_cli.body.gravity.interpolated import Box, interpolated_field
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.body.gravity.polyhedron import polyhedron_field
 from landing_cli.body.gravity.scaled_field import scaled_field
@@ -53,7 +53,7 @@ def field(model: str, gm: float) -> GravityField:
     box = Box(
         np.array([0.0, 0.0, 300.0]), np.eye(3), np.array([-80.0, -80.0, 0.0]), np.array([80.0, 80.0, 120.0])
     )
-    return interpolated_field(exact, box, 1e-4, 1).field
+    return boxed_field(exact, box, 1e-4, 1).field
 
 
 @pytest.mark.parametrize(

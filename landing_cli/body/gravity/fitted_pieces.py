@@ -15,9 +15,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from landing_cli.body.gravity.boxed_kernels import DEGREE, PER_PIECE
 from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.field_values import accelerations, gradients, potentials
-from landing_cli.body.gravity.interpolated_kernels import DEGREE, PER_PIECE
 from landing_cli.body.gravity.kernel_types import FloatArray
 from landing_cli.body.gravity.triangle_boxes import triangles_in_box
 

@@ -15,6 +15,12 @@ from llvmlite import ir  # type: ignore[import-untyped]
 from numba import extending, types
 from numba.core import cgutils
 
+from landing_cli.body.gravity.boxed_kernels import (
+    boxed_acceleration,
+    boxed_acceleration_and_gradient,
+    boxed_curvature,
+    boxed_potential,
+)
 from landing_cli.body.gravity.dipole import (
     dipole_acceleration,
     dipole_acceleration_and_gradient,
@@ -27,12 +33,6 @@ from landing_cli.body.gravity.harmonics import (
     harmonics_acceleration_and_gradient,
     harmonics_curvature,
     harmonics_potential,
-)
-from landing_cli.body.gravity.interpolated_kernels import (
-    interpolated_acceleration,
-    interpolated_acceleration_and_gradient,
-    interpolated_curvature,
-    interpolated_potential,
 )
 from landing_cli.body.gravity.kernel_types import FloatArray
 from landing_cli.body.gravity.point_mass import (
@@ -88,10 +88,10 @@ _MODELS: dict[GravityKind, tuple[Any, ...]] = {
         polyhedron_curvature,
     ),
     GravityKind.BOXED: (
-        interpolated_potential,
-        interpolated_acceleration,
-        interpolated_acceleration_and_gradient,
-        interpolated_curvature,
+        boxed_potential,
+        boxed_acceleration,
+        boxed_acceleration_and_gradient,
+        boxed_curvature,
     ),
     GravityKind.INTERPOLATED: (
         surrounding_potential,

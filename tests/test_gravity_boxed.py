@@ -7,6 +7,7 @@ import pytest
 from gravity_helpers import POTATO, points_around
 from kernel_calls import from_python
 
+from landing_cli.body.gravity.boxed import Box, BoxedField, boxed_field
 from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.field_values import (
     accelerations,
@@ -14,7 +15,6 @@ from landing_cli.body.gravity.field_values import (
     gradients,
     potentials,
 )
-from landing_cli.body.gravity.interpolated import Box, InterpolatedField, interpolated_field
 from landing_cli.body.gravity.kernels import curvature as curvature_part
 from landing_cli.body.gravity.point_mass import point_mass_field
 from landing_cli.body.gravity.polyhedron import polyhedron_field
@@ -38,8 +38,8 @@ def box(lower=(-60.0, -40.0, 0.0), upper=(50.0, 70.0, 90.0)) -> Box:
 
 
 @pytest.fixture(scope="module")
-def fitted() -> InterpolatedField:
-    return interpolated_field(EXACT, box(), TOLERANCE)
+def fitted() -> BoxedField:
+    return boxed_field(EXACT, box(), TOLERANCE)
 
 
 def points_in_box(count: int, seed: int = 1) -> np.ndarray:
@@ -53,7 +53,7 @@ def largest_share(values: np.ndarray, exact: np.ndarray) -> float:
     return float((sizes[0] / sizes[1]).max())
 
 
-def test_the_field_is_the_polyhedrons_within_the_measured_error(fitted: InterpolatedField) -> None:
+def test_the_field_is_the_polyhedrons_within_the_measured_error(fitted: BoxedField) -> None:
     assert fitted.field.kind is GravityKind.BOXED
     assert 0.0 < fitted.error < 5.0 * TOLERANCE
     assert fitted.covered > 0.8 and fitted.pieces > 1 and fitted.checked_points == 40 * fitted.pieces
@@ -69,12 +69,12 @@ def test_the_field_is_the_polyhedrons_within_the_measured_error(fitted: Interpol
 
 
 def test_a_smaller_tolerance_gives_a_smaller_error() -> None:
-    coarse, fine = (interpolated_field(EXACT, box(), tolerance, 6) for tolerance in (1e-5, 1e-8))
+    coarse, fine = (boxed_field(EXACT, box(), tolerance, 6) for tolerance in (1e-5, 1e-8))
     assert coarse.error > 10.0 * fine.error
     assert coarse.pieces < fine.pieces and coarse.covered > fine.covered
 
 
-def test_outside_the_box_and_in_the_body_the_polyhedron_answers(fitted: InterpolatedField) -> None:
+def test_outside_the_box_and_in_the_body_the_polyhedron_answers(fitted: BoxedField) -> None:
     below = SITE - np.outer([1e-3, 5.0], UP)
     points = np.concatenate([points_around(700.0, 20), points_around(50.0, 20), below])
     np.testing.assert_array_equal(accelerations(fitted.field, points), accelerations(EXACT, points))
@@ -82,13 +82,13 @@ def test_outside_the_box_and_in_the_body_the_polyhedron_answers(fitted: Interpol
     np.testing.assert_array_equal(potentials(fitted.field, points), potentials(EXACT, points))
 
 
-def test_third_derivatives_are_the_polyhedrons(fitted: InterpolatedField) -> None:
+def test_third_derivatives_are_the_polyhedrons(fitted: BoxedField) -> None:
     place, along = points_in_box(1)[0], (0.3, -0.2, 0.9)
     found = curvature(fitted.field.kind, fitted.field.params, *place, *along)
     assert found == curvature(EXACT.kind, EXACT.params, *place, *along)
 
 
-def test_the_fitted_field_is_conservative(fitted: InterpolatedField) -> None:
+def test_the_fitted_field_is_conservative(fitted: BoxedField) -> None:
     """g is the slope of U, and G that of g, by central differences within one piece."""
     place, h = SITE + 41.3 * UP + np.array([3.1, -2.2, 0.7]), 1e-2
     steps = h * np.eye(3)
@@ -105,7 +105,7 @@ def test_the_fitted_field_is_conservative(fitted: InterpolatedField) -> None:
 
 def test_the_site_itself_can_be_fitted() -> None:
     """The floor lies in the facet's plane; rounding puts the site on either side of it."""
-    small = interpolated_field(EXACT, box((-5.0, -5.0, 0.0), (5.0, 5.0, 6.0)), TOLERANCE)
+    small = boxed_field(EXACT, box((-5.0, -5.0, 0.0), (5.0, 5.0, 6.0)), TOLERANCE)
     assert small.covered == pytest.approx(1.0, rel=1e-12)
     places = [SITE + 1e-12 * UP, SITE - 1e-12 * UP]
     g, exact = (accelerations(field, places) for field in (small.field, EXACT))
@@ -136,9 +136,9 @@ def test_a_triangle_on_the_face_of_a_box_stays_outside() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: interpolated_field(point_mass_field(5.0), box()), "point_mass field is not worth"),
-        (lambda: interpolated_field(EXACT, box(lower=(60.0, -40.0, 0.0))), "the box is empty"),
-        (lambda: interpolated_field(EXACT, box(), 0.0), "tolerance is 0"),
+        (lambda: boxed_field(point_mass_field(5.0), box()), "point_mass field is not worth"),
+        (lambda: boxed_field(EXACT, box(lower=(60.0, -40.0, 0.0))), "the box is empty"),
+        (lambda: boxed_field(EXACT, box(), 0.0), "tolerance is 0"),
     ],
 )
 def test_what_cannot_be_interpolated_is_refused(make, message: str) -> None:

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from landing_cli.body.gravity.boxed_kernels import HEADER
 from landing_cli.body.gravity.checks import checked_number
 from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.field_values import accelerations_and_gradients
 from landing_cli.body.gravity.fitted_pieces import Pieces, TurnedPolyhedron, fit_pieces, probe_points
-from landing_cli.body.gravity.interpolated_kernels import HEADER
 from landing_cli.body.gravity.kernel_types import FloatArray
 from landing_cli.body.gravity.polyhedron_records import recorded_corners
 from landing_cli.errors import InputRefused
@@ -46,7 +46,7 @@ class Box:
 
 
 @dataclass(frozen=True, eq=False)
-class InterpolatedField:
+class BoxedField:
     """An interpolated field, and how good it is.
 
     Attributes
@@ -71,9 +71,9 @@ class InterpolatedField:
     covered: float
 
 
-def interpolated_field(
+def boxed_field(
     polyhedron: GravityField, box: Box, tolerance: float = TOLERANCE, most_halvings: int = MOST_HALVINGS
-) -> InterpolatedField:
+) -> BoxedField:
     """Interpolate a polyhedron's field over a box.
 
     Parameters
@@ -89,7 +89,7 @@ def interpolated_field(
 
     Returns
     -------
-    InterpolatedField
+    BoxedField
 
     Raises
     ------
@@ -114,13 +114,13 @@ def interpolated_field(
     field = GravityField(GravityKind.BOXED, _packed(polyhedron, box, center, half, pieces))
     error, gradient_error, points = _measured(field, body, pieces)
     covered = float((pieces.half.prod(axis=1) / half.prod()).sum())
-    return InterpolatedField(field, error, gradient_error, points, len(pieces.center), covered)
+    return BoxedField(field, error, gradient_error, points, len(pieces.center), covered)
 
 
 def _packed(
     polyhedron: GravityField, box: Box, center: FloatArray, half: FloatArray, pieces: Pieces
 ) -> FloatArray:
-    """Parameters as `interpolated_kernels` reads them."""
+    """Parameters as `boxed_kernels` reads them."""
     tree, coefficients = pieces.tree.astype(np.float64), pieces.coefficients.ravel()
     first = HEADER + len(tree)
     head = [[first + len(coefficients), first], box.origin_m, box.axes.ravel(), center, half]

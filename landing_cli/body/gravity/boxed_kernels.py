@@ -88,7 +88,7 @@ def _fitted_values(params: Params, x: float, y: float, z: float) -> Fitted:
 
 
 @kernel
-def interpolated_potential(params: Params, x: float, y: float, z: float) -> float:
+def boxed_potential(params: Params, x: float, y: float, z: float) -> float:
     """Return U."""
     fitted = _fitted_values(params, x, y, z)
     if fitted[0]:
@@ -97,7 +97,7 @@ def interpolated_potential(params: Params, x: float, y: float, z: float) -> floa
 
 
 @kernel
-def interpolated_acceleration(params: Params, x: float, y: float, z: float) -> Vector:
+def boxed_acceleration(params: Params, x: float, y: float, z: float) -> Vector:
     """Return the gradient of U."""
     fitted = _fitted_values(params, x, y, z)
     if fitted[0]:
@@ -106,9 +106,7 @@ def interpolated_acceleration(params: Params, x: float, y: float, z: float) -> V
 
 
 @kernel
-def interpolated_acceleration_and_gradient(
-    params: Params, x: float, y: float, z: float
-) -> VectorAndSymmetric:
+def boxed_acceleration_and_gradient(params: Params, x: float, y: float, z: float) -> VectorAndSymmetric:
     """Return the gradient and the Hessian (xx, yy, zz, xy, xz, yz) of U."""
     fitted = _fitted_values(params, x, y, z)
     if fitted[0]:
@@ -117,7 +115,7 @@ def interpolated_acceleration_and_gradient(
 
 
 @kernel
-def interpolated_curvature(
+def boxed_curvature(
     params: Params, x: float, y: float, z: float, lx: float, ly: float, lz: float
 ) -> Symmetric:
     """Return the derivative of the polyhedron's Hessian along (lx, ly, lz): third derivatives are its own."""
