@@ -14,7 +14,6 @@ from landing_cli.results.tables import Table, TableColumn, to_csv, to_json
 from landing_cli.results.tree import flag_words
 from landing_cli.studies.rank.score import MEASURES, Ranking
 
-TEXTS = ("csv", "json")
 MAPS = tuple(WRITERS)
 
 
