@@ -178,6 +178,9 @@ def tables() -> dict[str, Callable[[], list[tuple[Case, Chooser]]]]:
         "eros_boundary_broadside": lambda: [
             (eros_polyhedron(1500.0, "broadside", (0.0, -14000.0, 0.0)), near_boundary(30, 0, survey=60))
         ],
+        "eros_boundary_oblique": lambda: [
+            (eros_polyhedron(1500.0, "oblique", (9000.0, 0.0, 10000.0)), near_boundary(20, 0, survey=40))
+        ],
         "eros": lambda: [(eros(2500.0), near_boundary(16, 8))],
         "eros_flown_mass": lambda: [(eros(2500.0, final_mass="flown"), near_boundary(16, 8))],
     }
