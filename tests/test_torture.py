@@ -56,6 +56,6 @@ def test_every_hostile_scenario_and_shape_is_told_by_name_at_little_cost() -> No
 
 
 def test_a_forged_result_is_refused_or_harmless(folder: Path) -> None:
-    tally = forge_results(folder, every=150)
+    tally = forge_results(folder, every=300)
     assert not tally.failures
-    assert tally.tried >= 8
+    assert tally.tried >= 4

@@ -26,6 +26,8 @@ FAST = (
     "--set",
     "tour.beam.beam=4",
     "--set",
+    "tour.beam.waits_d=[0]",
+    "--set",
     "tour.beam.kept_chains=2",
     "--set",
     "tour.limits.asteroids_max=2",
