@@ -33,7 +33,7 @@ from landing_cli.errors import InputRefused
 OUTER = 2.0
 """Where one expansion begins that holds for all that is farther, in the body's largest radii."""
 MOST_FACETS = 20_000
-"""Fitting takes as the square of the facets: half a minute of CPU for 8000."""
+"""Fitting takes as the square of the facets: two minutes of CPU for 8000."""
 _PROBED_PIECES = 400
 _PROBES = 3
 

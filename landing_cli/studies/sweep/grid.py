@@ -100,8 +100,6 @@ class Grid:
     question : Question
     surface : Surface
         What all cells land on.
-    say : callable
-        Told one line when something takes a while.
     states : tuple of str
         Names of the initial states.
     cases : tuple of LandingCase
