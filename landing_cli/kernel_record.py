@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
+import numpy as np
 from numba import extending, types
 from numba.core import cgutils
 from numba.core.typing import templates
@@ -40,12 +41,29 @@ class RecordType(types.Type):
 
 def by_reference(record: Class) -> Class:
     """Let kernels take a NamedTuple class by reference."""
+    known: dict[Any, RecordType] = {}
 
     @_extending.typeof_impl.register(record)
     def typeof_record(value: Any, context: Any) -> RecordType:
-        return RecordType(record, tuple(_extending.typeof_impl(field, context) for field in value))
+        # every call from Python asks; numba would look at dozens of arrays
+        key = _typed_by(value)
+        if key not in known:
+            known[key] = RecordType(record, tuple(_extending.typeof_impl(field, context) for field in value))
+        return known[key]
 
     return record
+
+
+def _typed_by(value: Any) -> Any:
+    """Return what the type of a record's field depends on, for numba."""
+    kind = type(value)
+    if isinstance(value, np.ndarray):
+        return kind, value.dtype, value.ndim, value.flags.num
+    if isinstance(value, tuple):
+        return kind, *map(_typed_by, value)
+    if kind is int:
+        return kind, -(2**63) <= value < 2**63
+    return kind if kind in (float, bool) or isinstance(value, np.generic) else (kind, value)
 
 
 def always_alike(record: Class) -> Class:
