@@ -7,7 +7,9 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 from scenario_samples import write_minimal
@@ -15,6 +17,8 @@ from scenario_samples import write_minimal
 from landing_cli import __version__
 from landing_cli.cli import guard
 from landing_cli.cli.app import main
+from landing_cli.cli.carry_out import carry_out
+from landing_cli.cli.console import Console
 from landing_cli.errors import (
     ExitCode,
     InputRefused,
@@ -269,3 +273,19 @@ def test_a_signal_ends_the_process_within_two_seconds(number: signal.Signals, wo
     assert time.monotonic() - began < 2.0
     assert process.stderr.read() == f"interrupted by {number.name}; continue with --resume\n"
     process.stderr.close()
+
+
+@pytest.mark.parametrize(("done", "kept"), [(0, False), (3, True)])
+def test_an_interrupted_command_speaks_of_what_is_kept_only_where_something_is(
+    done: int, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hints = [""]
+    monkeypatch.setattr(guard, "hint_on_interrupt", hints.append)
+
+    def interrupted(progress: Callable[[int, int], None]) -> NoReturn:
+        progress(done, 10)
+        raise guard.Interrupted(signal.SIGINT)
+
+    with pytest.raises(guard.Interrupted):
+        carry_out(interrupted, Path("run.h5"), Console(quiet=True), "facets")
+    assert ("--resume" in hints[-1]) == kept

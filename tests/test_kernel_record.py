@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-import pytest
 
 from landing_cli.kernel import kernel
 from landing_cli.kernel_lanes import new_lanes

@@ -86,9 +86,14 @@ def carry_out(
     Outcome
         What the pipeline returned.
     """
-    guard.hint_on_interrupt(f"finished {unit} are kept: continue with --resume (output {path})")
     with voice.progress(unit) as progress:
-        outcome = run(progress)
+
+        def told(done: int, total: int) -> None:
+            if done:  # until then, while kernels compile say, there is nothing to continue
+                guard.hint_on_interrupt(f"finished {unit} are kept: continue with --resume (output {path})")
+            progress(done, total)
+
+        outcome = run(told)
     guard.hint_on_interrupt("")
     say_written(outcome, path, voice, same)
     return outcome
