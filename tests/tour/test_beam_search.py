@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,16 +20,34 @@ from landing_cli.errors import PartialResult
 from landing_cli.flight.astronomy import DAY_S, GM_SUN_M3_S2
 from landing_cli.flight.kepler import propagate_kepler
 from landing_cli.parallel import LostChunk, WorkPlan, run_chunks
-from landing_cli.tour import layered_search
-from landing_cli.tour.beam import Chains, extended, improved, scratch_for
+from landing_cli.tour import beam_search, layered_search
+from landing_cli.tour.beam import Chains, SearchSpace, extended, improved, scratch_for
 from landing_cli.tour.beam_search import FINAL_ROUNDS, choose, first_level, search, serial
 from landing_cli.tour.chain_kernel import LEG_COLUMNS, chain_cost as chain_cost_part
-from landing_cli.tour.first_level import carrier, shot
+from landing_cli.tour.first_legs import Fan
+from landing_cli.tour.first_level import carrier, first_fan, shot
 from landing_cli.tour.layered_search import preferred
-from landing_cli.tour.records import LayeredOptions, SearchOutcome
+from landing_cli.tour.records import Departure, LayeredOptions, SearchOutcome
 from landing_cli.tour.target_table import positions_at
 
 chain_cost = from_python(chain_cost_part)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_fan() -> Iterator[None]:
+    """Fly the fan of first burns, which is most of a search, once for each departure, limit and grid."""
+    fans: dict[Any, Fan] = {}
+
+    def remembered(start: Departure, wait_max_s: float, at: SearchSpace) -> Fan:
+        key = repr(start), wait_max_s, at.limit_m_s, at.table.grid_t_s.tobytes()
+        if key not in fans:
+            fans[key] = first_fan(start, wait_max_s, at)
+        return fans[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (beam_search, layered_search):
+            patch.setattr(module, "first_fan", remembered)
+        yield
 
 
 @pytest.fixture(scope="module")
