@@ -1,7 +1,8 @@
 """The compiled kernels: whether they are in the cache, and their first compilation.
 
 Most of a compilation is numba's own work in Python, which threads cannot share. Forked copies of the process
-can: each compiles some, and what it leaves in the cache on disk is linked, not compiled, by the next.
+can: each compiles some, and what it leaves in the cache on disk is loaded, not compiled, by the others. None
+waits for another: the kernels of a solve call each other by address (`kernel_address`).
 """
 
 from __future__ import annotations
@@ -67,7 +68,8 @@ def compile_parts(case: LandingCase) -> None:
         build_surface_index(mesh), facet_centroids(mesh), facet_normals(mesh), mean_edge_m(mesh), unbound
     )
     prepared = prepare(case, shared)
-    parts = [_flight, _conic, _verdicts, _solve, _delivery, _ellipsoid_arcs, lambda _: survey(case)]
+    # the longest first
+    parts = [_flight, _conic, _solve, _delivery, _verdicts, _ellipsoid_arcs, lambda _: survey(case)]
     if case.descent == "extremal":
         parts.insert(0, _extremals)
     if case.terrain == "require":
