@@ -2,9 +2,9 @@
 
 ``kernel`` is for what Python calls: cached on disk. ``part`` is for what only kernels call: it is typed and
 translated once, but optimised and made machine code with its callers alone, which takes a fifth off the first
-compilation. ``inner`` is for a large part that a process of its own compiles, for those that link it (see
-`reach.kernels`). ``inlined`` spares a short function with one caller its translation too; long ones compile
-slower inlined.
+compilation. ``inner`` is for a large part that a process of its own compiles, and that kernels call by its
+address (see `kernel_address`). ``inlined`` spares a short function with one caller its translation too; long
+ones compile slower inlined.
 
 A trap of numba's: a function is compiled again for each literal argument, also for a variable that begins as
 one (begin with ``np.int64(0)``).

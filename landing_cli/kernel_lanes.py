@@ -19,6 +19,8 @@ from numba.core import cgutils, typeconv
 from numba.core.typing import templates
 from numpy.typing import NDArray
 
+from landing_cli.kernel_outline import own_function
+
 # numba's own functions are not typed
 _types: Any = types
 _typeconv: Any = typeconv
@@ -280,12 +282,17 @@ def _lane_copier(reads: bool) -> Any:
                 size = builder.mul(size, extent)
             sizes.append(size)
         shorter = builder.select(builder.icmp_signed("<", *sizes), *sizes)
-        with _cgutils.for_range(builder, shorter) as loop:
-            of_lane = builder.add(builder.mul(loop.index, ir.Constant(ir.IntType(64), WIDTH)), values[1])
-            wide, plain = builder.gep(places[0], [of_lane]), builder.gep(places[1], [loop.index])
-            source, target = (wide, plain) if reads else (plain, wide)
-            builder.store(builder.load(source), target)
+        arguments = places[0], places[1], values[1], shorter
+        signature = ir.FunctionType(ir.VoidType(), [argument.type for argument in arguments])
+        builder.call(own_function(context, builder, ("lane", reads), signature, loop), arguments)
         return context.get_dummy_value()
+
+    def loop(_context: Any, builder: Any, wide: Any, plain: Any, place: Any, size: Any) -> None:
+        with _cgutils.for_range(builder, size) as each:
+            number = builder.add(builder.mul(each.index, ir.Constant(ir.IntType(64), WIDTH)), place)
+            of_lane, of_plain = builder.gep(wide, [number]), builder.gep(plain, [each.index])
+            source, target = (of_lane, of_plain) if reads else (of_plain, of_lane)
+            builder.store(builder.load(source), target)
 
     def copy(_context: Any, array: Any, place: Any, plain: Any) -> Any:
         fits = array.dtype == lanes and plain.dtype == _real and array.layout == plain.layout == "C"

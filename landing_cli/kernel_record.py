@@ -12,9 +12,12 @@ from __future__ import annotations
 from typing import Any, TypeVar
 
 import numpy as np
+from llvmlite import ir  # type: ignore[import-untyped]
 from numba import extending, types
 from numba.core import cgutils
 from numba.core.typing import templates
+
+from landing_cli.kernel_outline import own_function
 
 # numba's own functions are not typed
 _types: Any = types
@@ -46,7 +49,7 @@ def by_reference(record: Class) -> Class:
     @_extending.typeof_impl.register(record)
     def typeof_record(value: Any, context: Any) -> RecordType:
         # every call from Python asks; numba would look at dozens of arrays
-        key = _typed_by(value)
+        key = _typed_by(value, context)
         if key not in known:
             known[key] = RecordType(record, tuple(_extending.typeof_impl(field, context) for field in value))
         return known[key]
@@ -54,16 +57,18 @@ def by_reference(record: Class) -> Class:
     return record
 
 
-def _typed_by(value: Any) -> Any:
-    """Return what the type of a record's field depends on, for numba."""
+def _typed_by(value: Any, context: Any) -> Any:
+    """Return what numba's type of a value depends on, or that type itself."""
     kind = type(value)
     if isinstance(value, np.ndarray):
         return kind, value.dtype, value.ndim, value.flags.num
     if isinstance(value, tuple):
-        return kind, *map(_typed_by, value)
+        return kind, *(_typed_by(field, context) for field in value)
     if kind is int:
         return kind, -(2**63) <= value < 2**63
-    return kind if kind in (float, bool) or isinstance(value, np.generic) else (kind, value)
+    if kind in (float, bool) or isinstance(value, np.generic):
+        return kind
+    return _extending.typeof_impl(value, context)
 
 
 def always_alike(record: Class) -> Class:
@@ -113,17 +118,50 @@ def _load_field(context: Any, builder: Any, record: RecordType, pointer: Any, na
     return value
 
 
+def _unbox_array(context: Any, builder: Any, kind: Any, value: Any, place: Any) -> Any:
+    """Unbox an array to where it shall lie; tell whether that failed."""
+
+    def build(context: Any, builder: Any, value: Any, place: Any) -> Any:
+        native = context.get_python_api(builder).to_native_value(kind, value)
+        builder.store(context.data_model_manager[kind].as_data(builder, native.value), place)
+        return native.is_error
+
+    signature = ir.FunctionType(ir.IntType(1), [value.type, place.type])
+    return builder.call(own_function(context, builder, kind, signature, build), [value, place])
+
+
+def _give_back(context: Any, builder: Any, record: RecordType, place: Any) -> None:
+    """Drop what unboxing the fields took: a pointer has no count of references of its own."""
+
+    def build(context: Any, builder: Any, place: Any) -> None:
+        for i, kind in enumerate(record.fields.types):
+            where = _cgutils.gep_inbounds(builder, place, 0, i)
+            value = context.data_model_manager[kind].load_from_data_pointer(builder, where)
+            if isinstance(kind, RecordType):
+                _give_back(context, builder, kind, value)
+            else:
+                context.nrt.decref(builder, kind, value)
+
+    signature = ir.FunctionType(ir.VoidType(), [place.type])
+    builder.call(own_function(context, builder, record, signature, build), [place])
+
+
 @_extending.unbox(RecordType)
 def _unbox_record(record: RecordType, value: Any, c: Any) -> Any:
     """Unbox the fields into the frame of the call."""
-    native = c.unbox(record.fields, value)
-    model = c.context.data_model_manager[record.fields]
-    place = _cgutils.alloca_once_value(c.builder, model.as_data(c.builder, native.value))
-
-    def give_back() -> None:
-        """Drop what unboxing the fields took: a pointer has no count of references of its own."""
-        if native.cleanup is not None:
-            native.cleanup()
-        c.context.nrt.decref(c.builder, record.fields, native.value)
-
-    return _extending.NativeValue(place, is_error=native.is_error, cleanup=give_back)
+    models, failed = c.context.data_model_manager, _cgutils.false_bit
+    place = _cgutils.alloca_once(c.builder, models[record.fields].get_data_type())
+    for i, kind in enumerate(record.fields.types):
+        field, where = c.pyapi.tuple_getitem(value, i), _cgutils.gep_inbounds(c.builder, place, 0, i)
+        if isinstance(kind, types.Array):
+            refused = _unbox_array(c.context, c.builder, kind, field, where)
+        else:
+            native = c.unbox(kind, field)
+            if native.cleanup is not None and not isinstance(kind, RecordType):
+                raise NotImplementedError(f"a field of {kind}")
+            c.builder.store(models[kind].as_data(c.builder, native.value), where)
+            refused = native.is_error
+        failed = c.builder.or_(failed, refused)
+    return _extending.NativeValue(
+        place, is_error=failed, cleanup=lambda: _give_back(c.context, c.builder, record, place)
+    )

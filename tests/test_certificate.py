@@ -11,7 +11,11 @@ from landing_samples import asteroid, landing_case
 from landing_cli.body.gravity.field_values import accelerations
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.optimize.conic_records import Model, new_model
-from landing_cli.reach.certificate import certified_thrust_level, gravity_bounds, gravity_tube
+from landing_cli.reach.certificate import (
+    certified_thrust_level as certified_thrust_level_part,
+    gravity_bounds,
+    gravity_tube,
+)
 from landing_cli.reach.descent_model import (
     fill_arc_cones as fill_arc_cones_part,
     fill_glide_cones as fill_glide_cones_part,
@@ -25,6 +29,7 @@ from landing_cli.reach.records import Verdict
 from landing_cli.reach.scaled_case import scale_case
 from landing_cli.reach.shooting import fly_accurately as fly_accurately_part
 
+certified_thrust_level = from_python(certified_thrust_level_part)
 fill_arc_cones = from_python(fill_arc_cones_part)
 fill_glide_cones = from_python(fill_glide_cones_part)
 fill_handover_rows = from_python(fill_handover_rows_part)

@@ -17,10 +17,10 @@ from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.optimize.conic_records import Model, Point, new_model, new_point
 from landing_cli.reach.descent_model import (
     Layout,
-    fill_arc_cones,
+    fill_arc_cones as fill_arc_cones_part,
     fill_glide_cones as fill_glide_cones_part,
     fill_handover_rows as fill_handover_rows_part,
-    layout,
+    layout as layout_part,
     refresh,
 )
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc as measure_arc_part
@@ -31,8 +31,10 @@ from landing_cli.reach.shooting import Path, new_path
 
 ellipsoid_level = from_python(ellipsoid_level_part)
 
+fill_arc_cones = from_python(fill_arc_cones_part)
 fill_glide_cones = from_python(fill_glide_cones_part)
 fill_handover_rows = from_python(fill_handover_rows_part)
+layout = from_python(layout_part)
 measure_arc = from_python(measure_arc_part)
 
 N = 10

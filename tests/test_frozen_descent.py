@@ -11,7 +11,7 @@ from landing_samples import landing_case
 from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.flight.spacecraft import Spacecraft
 from landing_cli.optimize.conic_records import Model, Point
-from landing_cli.reach.descent_model import Layout, layout, refresh
+from landing_cli.reach.descent_model import Layout, layout as layout_part, refresh
 from landing_cli.reach.free_solve import Solver, basis_of, cold_start, fill_constants, new_solver_of
 from landing_cli.reach.records import LandingCase
 from landing_cli.reach.scaled_case import ScaledCase, ellipsoid_normal as ellipsoid_normal_part, scale_case
@@ -19,6 +19,7 @@ from landing_cli.reach.shooting import fly as fly_part
 
 ellipsoid_normal = from_python(ellipsoid_normal_part)
 fly = from_python(fly_part)
+layout = from_python(layout_part)
 
 INTERVALS = 12
 WALL_AHEAD = 0.01

@@ -13,7 +13,7 @@ from truth.tables import landing_case as true_case, read_table
 
 from landing_cli.optimize.conic_records import new_model
 from landing_cli.reach import proofs, sides
-from landing_cli.reach.certificate import certified_thrust_level
+from landing_cli.reach.certificate import certified_thrust_level as certified_thrust_level_part
 from landing_cli.reach.descent_model import (
     fill_arc_cones as fill_arc_cones_part,
     fill_glide_cones as fill_glide_cones_part,
@@ -28,6 +28,7 @@ from landing_cli.reach.scaled_case import (
     ellipsoid_normal as ellipsoid_normal_part,
 )
 
+certified_thrust_level = from_python(certified_thrust_level_part)
 ellipsoid_level = from_python(ellipsoid_level_part)
 ellipsoid_normal = from_python(ellipsoid_normal_part)
 fill_arc_cones = from_python(fill_arc_cones_part)

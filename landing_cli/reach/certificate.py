@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from landing_cli.body.asteroid import Asteroid
 from landing_cli.body.gravity.bounds import largest_acceleration_outside
 from landing_cli.body.gravity.surface_bound import largest_acceleration_on_mesh
-from landing_cli.kernel import kernel, part
+from landing_cli.kernel import part
 from landing_cli.optimize.conic_records import Model, Point
 from landing_cli.reach.descent_model import Layout
 from landing_cli.reach.planes import Cuts
@@ -170,7 +170,7 @@ def _dual_feasible(
         z[0] = math.sqrt(z[1] * z[1] + z[2] * z[2] + z[3] * z[3])
 
 
-@kernel
+@part
 def certified_thrust_level(
     case: ScaledCase,
     target: Floats,
@@ -240,7 +240,7 @@ def certified_thrust_level(
     return work / by_thrust
 
 
-@kernel
+@part
 def linearised_thrust_level(
     case: ScaledCase, plan: Layout, point: Point, model: Model, duals: Floats
 ) -> float:

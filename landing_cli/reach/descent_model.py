@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import inlined, kernel, part
+from landing_cli.kernel import inlined, part
 from landing_cli.kernel_lanes import choose
 from landing_cli.optimize.conic_ipm import fill_row_pull
 from landing_cli.optimize.conic_records import Model, Point
@@ -56,7 +56,7 @@ class Layout(NamedTuple):
     tau_free: bool  # minimise tau + rho J instead of rho J at tau = 1
 
 
-@kernel
+@part
 def layout(case: ScaledCase, n_planes: int, energy_weight: float, tau_free: bool) -> Layout:
     """Count rows and cones for a case with ``n_planes`` tangent planes and walls."""
     n_equal = 7 if case.on_ellipsoid else 6
@@ -86,7 +86,7 @@ def fill_handover_rows(case: ScaledCase, model: Model) -> None:
     model.row_y[4, 4] -= spin * r_s
 
 
-@kernel
+@part
 def fill_arc_cones(case: ScaledCase, model: Model) -> None:
     """Constant derivatives of the final stage's thrust with respect to (a_e, a_s).
 

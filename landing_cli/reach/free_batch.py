@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.kernel import inlined, kernel
+from landing_cli.kernel_address import call
 from landing_cli.kernel_lanes import WIDTH, with_lane
 from landing_cli.kernel_record import by_reference
 from landing_cli.reach.descent_model import Layout, layout
@@ -26,9 +27,6 @@ from landing_cli.reach.free_solve import (
     RETAKEN,
     LaneSolver,
     Solver,
-    judge,
-    linearise,
-    take_step,
 )
 from landing_cli.reach.lane_contents import fill_order, keep, take_in
 from landing_cli.reach.scaled_case import ScaledCase
@@ -141,26 +139,15 @@ def _turn(
     if not active:
         return False
     plan = layout(case, planes, energy_weight, tau_free)
-    linearise(case, plan, lanes)
+    call(solver.linearise, (case, plan, lanes))
     goes_on = False
     for place in range(WIDTH):
         i = facet[place]
         if i < 0:
             continue
-        outcome = judge(
-            case,
-            plan,
-            lanes,
-            place,
-            iteration[place],
-            cuts.planes[i],
-            tube,
-            arc_bound,
-            limit,
-            prove,
-            solver.single,
-            bound[place],
-        )
+        of_facet = place, iteration[place], cuts.planes[i]
+        bounds = tube, arc_bound, limit, prove, solver.single, bound[place]
+        outcome = call(solver.judge, (case, plan, lanes, *of_facet, *bounds))
         bound[place] = outcome.bound
         if outcome.status < 0:
             goes_on = True
@@ -170,13 +157,14 @@ def _turn(
         keep(i, place, case, plan, lanes, solver.single, count, cuts, out)
         facet[place] = -1
     if goes_on:
-        take_step(plan, lanes)
+        call(solver.take_step, (plan, lanes))
     return True
 
 
 @inlined
-def _fill_drift(case: ScaledCase, plan: Layout, lanes: Solver, begun: Solver) -> None:
+def _fill_drift(case: ScaledCase, plan: Layout, solver: LaneSolver) -> None:
     """Fly without thrust: all facets' starts are reckoned from there."""
+    lanes, begun = solver.lanes, solver.begun
     n = lanes.point.thrust.shape[0]
     for k in range(n):
         for i in range(3):
@@ -185,7 +173,7 @@ def _fill_drift(case: ScaledCase, plan: Layout, lanes: Solver, begun: Solver) ->
         lanes.path.defect[i] = 0.0
     for mark in range(4):
         lanes.marks[mark] = 0.0
-    linearise(case, plan, lanes)
+    call(solver.linearise, (case, plan, lanes))
     for i in range(3):
         lanes.drift[i], lanes.drift[3 + i] = lanes.path.position[n, i], lanes.path.velocity[n, i]
     for i in range(6):
@@ -246,7 +234,7 @@ def solve_many(
     order = np.empty(targets.shape[0], dtype=np.int64)
     fill_order(cuts.planes, walls.walls, lanes.cuts.node.shape[0], order)
     plan = layout(case, loaded, energy_weight, tau_free)
-    _fill_drift(case, plan, lanes, begun)
+    _fill_drift(case, plan, solver)
     solver.facet[:, :] = -1
     halved = not prove and lanes.point.thrust.shape[0] >= HALVED_FROM
     while going:

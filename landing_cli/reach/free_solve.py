@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 import threading
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from landing_cli.kernel import inlined, inner, part
+from landing_cli.kernel_address import Callee
 from landing_cli.kernel_lanes import WIDTH, any_lane, choose, lane, new_lanes, put_lane, take_lane
 from landing_cli.kernel_record import always_alike, by_reference
 from landing_cli.optimize.conic_ipm import advance, residuals
@@ -31,6 +33,8 @@ from landing_cli.reach.descent_model import (
 from landing_cli.reach.planes import Cuts, new_cuts
 from landing_cli.reach.scaled_case import ScaledCase
 from landing_cli.reach.shooting import Path, measure_defect, new_path
+
+_types: Any = types  # not typed
 
 Floats = NDArray[np.float64]
 
@@ -96,6 +100,9 @@ class LaneSolver(NamedTuple):
     facet: NDArray[np.int64]  # (2, WIDTH) place in the batch, -1: none; of the lanes, then of the begun
     iteration: NDArray[np.int64]  # (2, WIDTH)
     bound: Floats  # (2, WIDTH)
+    linearise: Callee
+    take_step: Callee
+    judge: Callee
 
 
 class Outcome(NamedTuple):
@@ -135,22 +142,36 @@ def new_solver(case: ScaledCase, walls: int = 0) -> LaneSolver:
     planes = n + 1 + walls
     n_rows = 7 + planes + 2
     whole = np.int64
+    lanes = new_solver_of(n, n_cones, n_rows, planes, basis, new_lanes)
+    single = Single(
+        new_point(n, n_cones, n_rows),
+        new_model(n, n_cones, n_rows, basis),
+        new_cuts(planes),
+        np.zeros(3),
+        np.zeros((6, 6)),
+        np.zeros(6),
+        np.zeros((n_cones, 4)),
+    )
     return LaneSolver(
-        new_solver_of(n, n_cones, n_rows, planes, basis, new_lanes),
+        lanes,
         new_solver_of(n // 2, n_cones, 9, 0, basis, new_lanes),
         on_half(case),
-        Single(
-            new_point(n, n_cones, n_rows),
-            new_model(n, n_cones, n_rows, basis),
-            new_cuts(planes),
-            np.zeros(3),
-            np.zeros((6, 6)),
-            np.zeros(6),
-            np.zeros((n_cones, 4)),
-        ),
+        single,
         np.full((2, WIDTH), -1, dtype=whole),
         np.zeros((2, WIDTH), dtype=whole),
         np.zeros((2, WIDTH)),
+        *callees(case, lanes, single),
+    )
+
+
+def callees(case: ScaledCase, lanes: Solver, single: Single) -> tuple[Callee, Callee, Callee]:
+    """Return `linearise`, `take_step` and `judge` for these kinds of arguments."""
+    plan, tube = Layout(0, 0, 0, 0, 1.0, False), np.empty(0)
+    outcome = _types.NamedTuple((_types.int64, _types.float64), Outcome)
+    return (
+        Callee(linearise, _types.none, case, plan, lanes),
+        Callee(take_step, _types.none, plan, lanes),
+        Callee(judge, outcome, case, plan, lanes, 0, 0, 0, tube, 0.0, 0, False, single, 0.0),
     )
 
 
@@ -310,7 +331,7 @@ def take_out(solver: Solver, place: int, whole: bool, single: Single) -> None:
         take_lane(point.thrust, place, own.thrust)
 
 
-@part
+@inner
 def judge(
     case: ScaledCase,
     plan: Layout,

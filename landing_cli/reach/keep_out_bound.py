@@ -38,7 +38,8 @@ from numpy.typing import NDArray
 
 from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.field_values import accelerations
-from landing_cli.optimize.conic_records import new_model
+from landing_cli.kernel import kernel
+from landing_cli.optimize.conic_records import Model, new_model
 from landing_cli.reach.certificate import GravityBounds, gravity_tube
 from landing_cli.reach.descent_model import fill_arc_cones
 from landing_cli.reach.planes import arc_weights
@@ -53,6 +54,11 @@ NODES, PER_NODE = 8, 2
 INTERVALS = NODES * PER_NODE
 # |xi| that flights keep, and have at most at a handover on the ellipsoid: delivered ones may be so far off 1.
 LEVEL, HIGHEST = 1.0 - 1e-5, 1.0 + 1e-5
+
+
+@kernel
+def _fill_arc_cones(case: ScaledCase, model: Model) -> None:
+    fill_arc_cones(case, model)
 
 
 class Descent(NamedTuple):
@@ -125,7 +131,7 @@ def descent_of(case: LandingCase, bounds: GravityBounds) -> Descent:
     axes = scaled.inverse_axes[:, None] * turns[places]
     used = scaled.mass_flow * np.concatenate([ends[1:], [1.0 + scaled.final_time, 1.0]])
     model = new_model(INTERVALS, len(scaled.arc_fractions) + 2, 7)
-    fill_arc_cones(scaled, model)
+    _fill_arc_cones(scaled, model)
     to_ends = _handover_from_ends(scaled)
     arc_maps = model.cone_map[[0, len(scaled.arc_fractions) - 1], 1:4, 1:7] @ np.linalg.inv(to_ends)
     return Descent(

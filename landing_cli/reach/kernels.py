@@ -1,13 +1,13 @@
 """The compiled kernels: whether they are in the cache, and their first compilation.
 
 Most of a compilation is numba's own work in Python, which threads cannot share. Forked copies of the process
-can: each compiles some, and what it leaves in the cache on disk is linked, not compiled, by the next.
+can: each compiles some, and what it leaves in the cache on disk is loaded, not compiled, by the others. None
+waits for another: the kernels of a solve call each other by address (`kernel_address`).
 """
 
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -21,18 +21,15 @@ from landing_cli.body.mesh import facet_centroids, facet_normals
 from landing_cli.body.ray_cast import first_hits_into
 from landing_cli.compile_cache import is_cached
 from landing_cli.parallel.forks import share_out
-from landing_cli.reach.certificate import GravityBounds, certified_thrust_level, linearised_thrust_level
+from landing_cli.reach.certificate import GravityBounds
 from landing_cli.reach.delivery import deliver_many, new_deliveries
-from landing_cli.reach.descent_model import layout
 from landing_cli.reach.ellipsoid_arcs import arc_cuts_many, freeze_many, lowest_levels, lowest_levels_between
 from landing_cli.reach.free_batch import new_batch, no_cuts, no_walls, solve_many
 from landing_cli.reach.free_descent import PreparedCase, Surroundings, prepare, survey
-from landing_cli.reach.free_solve import LaneSolver, linearise, new_solver, take_step
+from landing_cli.reach.free_solve import LaneSolver, judge, linearise, new_solver, take_step
 from landing_cli.reach.records import LandingCase
 
 _typeof: Any = numba.typeof
-
-PATIENCE_S, TICK_S = 60.0, 0.02  # of what waits for kernels that another process compiles
 
 
 def are_compiled(descent: str, terrain: str = "report") -> bool:
@@ -45,7 +42,7 @@ def are_compiled(descent: str, terrain: str = "report") -> bool:
     terrain : {"report", "require"}
         Whether a path that cuts the mesh is a landing.
     """
-    kernels: list[Any] = [solve_many]
+    kernels: list[Any] = [solve_many, linearise, take_step, judge]
     if terrain == "require":
         kernels += [signed_distances_into, first_hits_into]
     if descent == "extremal":
@@ -71,8 +68,8 @@ def compile_parts(case: LandingCase) -> None:
         build_surface_index(mesh), facet_centroids(mesh), facet_normals(mesh), mean_edge_m(mesh), unbound
     )
     prepared = prepare(case, shared)
-    # what the solve joins comes before it, so that it waits little; the longest first
-    parts = [_flight, _conic, _certificates, _delivery, _solve, _ellipsoid_arcs, lambda _: survey(case)]
+    # the longest first
+    parts = [_flight, _conic, _solve, _delivery, _verdicts, _ellipsoid_arcs, lambda _: survey(case)]
     if case.descent == "extremal":
         parts.insert(0, _extremals)
     if case.terrain == "require":
@@ -89,30 +86,19 @@ def _solver(prepared: PreparedCase) -> LaneSolver:
     return new_solver(prepared.coarse)
 
 
-def _compile(kernel: Any, *arguments: object) -> None:
-    """Compile a kernel that Python cannot call."""
-    kernel.compile(tuple(_typeof(argument) for argument in arguments))
-
-
 def _conic(prepared: PreparedCase) -> None:
     """Interior-point iterations."""
-    _compile(take_step, layout(prepared.coarse, 0, 1.0, False), _solver(prepared).lanes)
+    _solver(prepared).take_step.compile()
 
 
-def _certificates(prepared: PreparedCase) -> None:
-    """Bounds that prove a facet unreachable."""
-    single, case, target = _solver(prepared).single, prepared.coarse, prepared.shared.normals[0]
-    point, model = single.point, single.model
-    linearised_thrust_level(case, layout(case, 0, 1.0, False), point, model, single.duals)
-    multipliers = point.multiplier, point.cone_dual, single.duals
-    certified_thrust_level(case, target, prepared.coarse_tube, 1.0, model, *multipliers, single.cuts, 0, 1.0)
+def _verdicts(prepared: PreparedCase) -> None:
+    """What tells that a facet is done, with the bounds that prove one unreachable."""
+    _solver(prepared).judge.compile()
 
 
 def _flight(prepared: PreparedCase) -> None:
     """The linearised flight, gravity and constraints."""
-    solver = _solver(prepared).lanes
-    plan = layout(prepared.coarse, 0, 1.0, False)
-    _compile(linearise, prepared.coarse, plan, solver)
+    _solver(prepared).linearise.compile()
 
 
 def _delivery(prepared: PreparedCase) -> None:
@@ -149,14 +135,11 @@ def _terrain(prepared: PreparedCase) -> None:
 
 
 def _solve(prepared: PreparedCase) -> None:
-    """The whole solve, once the kernels that it links are compiled."""
-    linked = (take_step, linearise, certified_thrust_level, linearised_thrust_level)
-    patience = time.monotonic() + PATIENCE_S
-    while not all(is_cached(kernel) for kernel in linked) and time.monotonic() < patience:
-        time.sleep(TICK_S)
+    """The loop over facets; the kernels that it calls are compiled elsewhere."""
     case, one, n = prepared.coarse, np.ones((1, 3)), len(prepared.coarse.mid_cos)
     batch = no_cuts(1, n), np.ones(1), no_walls(1), 1.0, True, 1, 1
-    solve_many(case, one, one, *batch, prepared.coarse_tube, 1.0, False, _solver(prepared), new_batch(1, n))
+    arguments = case, one, one, *batch, prepared.coarse_tube, 1.0, False, _solver(prepared), new_batch(1, n)
+    solve_many.compile(tuple(_typeof(argument) for argument in arguments))
 
 
 def _extremals(prepared: PreparedCase) -> None:

@@ -46,18 +46,18 @@ def keep_costates(case: ScaledCase, plan: Layout, single: Single, out: Floats) -
     With v_inertial = v + w x r the costates are lambda_v and lambda_r - w x lambda_v.
     """
     multiplier, mix = single.point.multiplier, single.model.row_mix
-    p = np.zeros(6)
+    out[:] = 0.0
     for b in range(6):
         weight = 0.0
         for r in range(plan.n_rows):
             weight += multiplier[r] * mix[r, b]
         for i in range(6):
-            p[i] += weight * single.to_start[b, i]
-    p[0] += case.spin * p[4]
-    p[1] -= case.spin * p[3]
+            out[i] += weight * single.to_start[b, i]
+    out[0] += case.spin * out[4]
+    out[1] -= case.spin * out[3]
     c, s = case.node_cos[0], case.node_sin[0]
     for i in range(0, 6, 3):
-        out[i], out[i + 1], out[i + 2] = c * p[i] + s * p[i + 1], c * p[i + 1] - s * p[i], p[i + 2]
+        out[i], out[i + 1] = c * out[i] + s * out[i + 1], c * out[i + 1] - s * out[i]
     out[6] = single.numbers[MASS_COSTATE]
 
 

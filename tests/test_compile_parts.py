@@ -1,0 +1,32 @@
+"""What is compiled before a run is what its solves call."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from landing_samples import asteroid, landing_case
+
+from landing_cli.reach import kernels
+from landing_cli.reach.free_batch import solve_many
+from landing_cli.reach.free_descent import prepare, solve_prepared, survey
+from landing_cli.reach.free_solve import judge, linearise, take_step
+
+
+def test_a_solve_finds_all_that_was_compiled_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = landing_case(asteroid(gravity=2.0, spin=2.0))
+    called: tuple[Any, ...] = (linearise, take_step, judge, solve_many)
+
+    def in_turn(parts: Any, _processes: int) -> None:
+        for part in parts:
+            part()
+
+    monkeypatch.setattr(kernels, "share_out", in_turn)
+    kernels.compile_parts(case)
+    kinds = [set(kernel.overloads) for kernel in called]
+    assert all(kinds)
+    prepared = prepare(case, survey(case))
+    solve_prepared(prepared, np.arange(0, len(prepared.shared.normals), 20))
+    assert [set(kernel.overloads) for kernel in called] == kinds
+    assert kernels.are_compiled(case.descent)
