@@ -93,6 +93,10 @@ def run_on_threads(
     (int, R)
         Index of a chunk and its answer, in the order of completion.
     """
+    if jobs == 1:  # nothing to share out: this thread does, and joblib need not be loaded
+        for index, chunk in enumerate(chunks):
+            yield index, function(chunk)
+        return
     from joblib import Parallel, delayed
 
     gate = _Gate(function, AFOOT_PER_JOB * jobs)
