@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from validation_text import exact, percent, table
+from validation_text import exact, percent, spread, table
 
 from landing_cli.body.gravity.field import GravityField
 from landing_cli.body.gravity.field_values import accelerations
@@ -19,6 +19,7 @@ from landing_cli.body.gravity.surrounding_kernels import ERROR
 from landing_cli.body.mesh import Mesh, facet_centroids, facet_normals
 from landing_cli.reach.cases import landing_cases
 from landing_cli.reach.free_descent import prepare, solve_prepared, survey
+from landing_cli.reach.least_thrust import with_margin
 from landing_cli.reach.pipeline import RunOptions, run
 from landing_cli.reach.records import Verdict
 from landing_cli.reach.stored import ReachRun
@@ -56,6 +57,14 @@ def polyhedral_gravity(eros: ReachRun, options: RunOptions, say: Callable[[str],
         "interpolated, m",
     )
     costs = ("field", "CPU a facet, ms")
+    levels = (
+        "field",
+        "tau, min / median / max",
+        "not found",
+        "tau < 1 and not reachable, or the reverse",
+        "tau less the dipole's, 5 % / median / 95 %",
+        "CPU a facet, ms",
+    )
     return f"""## 17. The gravity of a polyhedron
 
 `body.gravity.model: interpolated` flies in the field of the shape as a uniform polyhedron, through a fit: facets near
@@ -72,6 +81,10 @@ see is {exact(float(asteroid.gravity.params[ERROR]))}. Against the polyhedron it
 What it changes there; the misses are those of section 3:
 
 {table(changes, _changes(eros, fitted))}
+
+The least thrust levels tau (`reach.margin: true`) of the {FACETS} facets:
+
+{table(levels, _levels(eros, fitted))}
 """
 
 
@@ -98,7 +111,7 @@ def _costs() -> list[tuple[str, str]]:
         assert loaded.scenario.reach is not None
         case = landing_cases(loaded.scenario.reach, build(loaded))[0][1]
         prepared[model] = prepare(case, survey(case))
-    facets = np.random.default_rng(3).choice(len(case.asteroid.mesh.faces), FACETS, replace=False)
+    facets = _sample(len(case.asteroid.mesh.faces))
     spent: dict[str, list[float]] = {model: [] for model in prepared}
     for _ in range(ROUNDS):
         for model, of_model in prepared.items():
@@ -107,6 +120,36 @@ def _costs() -> list[tuple[str, str]]:
             solve_prepared(of_model, asked)
             spent[model].append((time.process_time() - begun) / len(asked))
     return [(model, f"{1e3 * min(times):.2f}") for model, times in spent.items()]
+
+
+def _levels(eros: ReachRun, fitted: ReachRun) -> list[tuple[object, ...]]:
+    """Margins of the sampled facets under both fields."""
+    fit = fitted.cases[0].case
+    dipole = next(c.case for c in eros.cases if c.case.name == fit.name)
+    facets = _sample(len(fit.asteroid.mesh.faces))
+    rows: list[tuple[object, ...]] = []
+    first = None
+    for model, case in (("dipole", dipole), ("interpolated", fit)):
+        prepared = prepare(case, survey(case))
+        begun = time.process_time()
+        found = with_margin(prepared, solve_prepared(prepared, facets)).rows
+        spent_ms = 1e3 * (time.process_time() - begun) / len(facets)
+        level = 1.0 - found["thrust_margin"]
+        known = np.isfinite(level)
+        wrong = known & ((level <= 1.0) != (found["verdict"] == Verdict.REACHABLE))
+        first = level if first is None else first
+        apart = (level - first)[np.isfinite(level - first)]
+        moved = (
+            "-" if model == "dipole" else " / ".join(f"{x:+.3f}" for x in np.percentile(apart, [5, 50, 95]))
+        )
+        rows.append(
+            (model, spread(level, "{:.3f}"), int((~known).sum()), int(wrong.sum()), moved, f"{spent_ms:.1f}")
+        )
+    return rows
+
+
+def _sample(facets: int) -> NDArray[np.int64]:
+    return np.random.default_rng(3).choice(facets, FACETS, replace=False)
 
 
 def _changes(eros: ReachRun, fitted: ReachRun) -> list[tuple[object, ...]]:

@@ -20,6 +20,7 @@ from landing_cli.results.surface_map import map_surface
 from landing_cli.scenario.load import load
 from landing_cli.studies.isochrone.figures.growth import growth_figure
 from landing_cli.studies.isochrone.figures.isochrones import isochrone_figure
+from landing_cli.studies.isochrone.figures.times import several_figure
 from landing_cli.studies.isochrone.intervals import interval_at
 from landing_cli.studies.isochrone.pipeline import RunOptions, run
 from landing_cli.studies.isochrone.records import End, IsochroneRun, StateResult
@@ -27,6 +28,13 @@ from landing_cli.studies.isochrone.verify import verify_run
 from landing_cli.studies.isochrone.work import Study, solve_at
 
 ROOT = Path(__file__).resolve().parent.parent
+# Head on, 3.7 m/s: full thrust stops within 684 m, the keep-out zone is 610 m away.
+APPROACH = (
+    "reach.initial_states=[{name: approach, position_km: [-1, 0, 0], velocity_m_s: [3.7, 0, 0]}]",
+    "reach.ellipsoid_m=[390, 380, 365]",
+    "isochrone.tof_min_s=350",
+    "isochrone.tof_max_s=1100",
+)
 RANGE = ("isochrone.tof_min_s=400", "isochrone.tof_max_s=1200")
 # Off the ladder: this share of a step after every so many of the grid's times.
 OFF_GRID_SHARE, OFF_GRID_TIMES = 0.377, 6
@@ -70,7 +78,63 @@ interval or a gap shorter than a step was missed.
 solved again, every flight flown by another integrator.
 
 {table(("initial state", "asked again", "otherwise", "flown", "worst miss, m", "worst integrators apart, m", "verified"), _verified(found))}
+
+{_approach(images, options)}"""
+
+
+def _approach(images: Path, options: RunOptions) -> str:
+    """Facets in reach early and late but not in between: a start that comes in too fast to stop and wait."""
+    loaded = load(str(ROOT / "configs" / "bennu.yaml"), APPROACH)
+    output = ROOT / "runs" / "bennu-approach.h5"
+    found = run(loaded, output, options, lambda done, total: None).run
+    (result,) = found.cases
+    with style():
+        write_png(several_figure(result), images / "validation-isochrone-several.png")
+    several = result.facets["intervals"] > 1
+    missing = _missing_s(result)[several]
+    gone, proved = _between(result)
+    asked, sure = int(gone[several].sum()), int(proved[several].sum())
+    wholly = int((gone == proved)[several].sum())
+    (report,) = verify_run(found.cases, jobs=2)
+    worst_m = exact(report.worst["touchdown_miss_m"].value)
+    rows = (
+        ("reachable at some time", result.summary["reachable"]),
+        ("in several intervals", int(several.sum())),
+        ("unresolved intervals", result.summary["unresolved_intervals"]),
+        ("out of reach in between, s: min / median / max", spread(missing)),
+        ("unreachable at the grid's times in between / of these proved", f"{asked} / {percent(sure, asked)}"),
+        ("proved unreachable at every time in between", f"{wholly} of {int(several.sum())}"),
+        ("asked again by `landing results verify` / otherwise", f"{report.questions} / {report.disagreeing}"),
+        ("flown again / worst miss, m", f"{report.flights} / {worst_m}"),
+    )
+    return f"""**Longer is not always easier.** A spacecraft that rests where it starts, and has the thrust to hover
+there, can wait and then fly what it can fly now: nothing above is lost again. One that comes in at 3.7 m/s from
+1 km, with 10 mm/s² to brake and 100 m of room added to the ellipsoid, cannot: it needs 684 m to stop, and the zone
+is 610 m away. It lands straight out of its approach, or it swerves around the zone and comes back.
+
+    reach isochrone bennu.yaml --tof-s 350:1100:25 --set 'reach.ellipsoid_m=[390, 380, 365]' \\
+      --set 'reach.initial_states=[{{name: approach, position_km: [-1, 0, 0], velocity_m_s: [3.7, 0, 0]}}]'
+
+{table(("", f"of {len(several)} facets"), rows)}
+
+Collocation says the same of six facets at 425, 500, 650 and 800 s (`bennu_approach` in section 5).
+
+![Facets of Bennu that are reachable in two intervals](images/validation-isochrone-several.png)
 """
+
+
+def _missing_s(result: StateResult) -> np.ndarray:
+    """For how long each facet is out of reach between its first and last time."""
+    facets = result.facets
+    return facets["last_tof_s"] - facets["first_tof_s"] - facets["reachable_s"] - facets["unresolved_s"]
+
+
+def _between(result: StateResult) -> tuple[np.ndarray, np.ndarray]:
+    """How often each facet is unreachable between its first and last time, and how often that is proved."""
+    tof_s, facets, answers = result.grid.tof_s[:, None], result.facets, result.answers
+    gone = (tof_s > facets["first_tof_s"]) & (tof_s < facets["last_tof_s"])
+    gone &= answers.verdict == Verdict.UNREACHABLE
+    return gone.sum(axis=0), (gone & (answers.proved == 1)).sum(axis=0)
 
 
 def _row(result: StateResult) -> tuple[object, ...]:

@@ -63,7 +63,8 @@ def test_halving_the_steps_of_the_fast_integrator_changes_nothing(
 ) -> None:
     legs = [leg, arc_after(leg)]
     coarse = fly(legs, "gauss")
-    for name in ("_STEPS_PER_NODE", "_EXTREMAL_STEPS", "_ARC_STEPS"):
+    monkeypatch.setattr(control, "_NODE_STEP_MAX_S", 500.0 / 40 / 2)
+    for name in ("_EXTREMAL_STEPS", "_ARC_STEPS"):
         monkeypatch.setattr(control, name, 2 * getattr(control, name))
     fine = fly(legs, "gauss")
     assert len(fine.t_s) > 1.8 * len(coarse.t_s)
@@ -169,3 +170,9 @@ def test_many_flights_equal_single_ones() -> None:
     )
     for legs, flown in zip(flights, many, strict=True):
         assert np.array_equal(flown.position_m, fly(list(legs), "gauss").position_m)
+
+
+def test_long_nodes_are_flown_in_short_steps() -> None:
+    sampled = control.sampled_control(ThrustNodesLeg(1200.0, np.ones((40, 3))), SPIN, EXHAUST)
+    assert sampled.steps_s.max() == 15.0
+    assert sampled.steps_s.sum() == pytest.approx(1200.0)

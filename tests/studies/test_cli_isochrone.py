@@ -80,8 +80,11 @@ def test_a_facet_is_told_in_a_sentence_with_its_intervals(result: Path, capsys: 
     assert told.startswith("top: facet 5 is reachable from 610.5")
     assert told.count("(not at") == 3
     assert "1000 s or beyond (the range ends there: open)" in told
+    assert "unreachable at 2 of the times asked in between, 2 of them proved" in told  # 750 and 800 s
     assert main("landing", ["results", "show", str(result), "--facet", "6", "-q"]) == 0
-    assert "unresolved from 620.3" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "unresolved from 620.3" in told
+    assert "in between" not in told
     assert main("landing", ["results", "show", str(result), "--facet", "7", "-q"]) == 0
     assert "not reachable at any of 11 times from 500 to 1000 s (proved)" in capsys.readouterr().out
     assert main("landing", ["results", "show", str(result), "--facet", "8"]) == ExitCode.REFUSED

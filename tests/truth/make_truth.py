@@ -35,6 +35,9 @@ BINDS = 1e-3  # an ellipsoid multiplier (scaled) above this shapes the path
 NORTH, EQUATOR, MIDDLE = (0.0, 0.0, 800.0), (800.0, 0.0, 0.0), (600.0, 0.0, 500.0)
 
 
+# Facets of Bennu that the approach of `bennu_approach` reaches in two intervals.
+APPROACHED = (167, 479, 872, 1299, 1652, 2459)
+
 Chooser = Callable[["Case", np.random.Generator], list[int]]
 
 
@@ -56,6 +59,13 @@ def bennu(name: str, r0: tuple[float, float, float], tof: float, **reading: str)
         r0, (0.0, 0.0, 0.0), omega, gravity, 2000.0, 20.0, 400.0, tof, 200.0, semi, np.pi / 3, **reading
     )
     return Case(f"{name}_{tof:.0f}s", problem, shape)
+
+
+def bennu_approach(tof: float) -> Case:
+    """Head on at a speed that full thrust takes 684 m to stop; the keep-out zone begins 610 m away."""
+    case = bennu("approach", (-1000.0, 0.0, 0.0), tof)
+    moving = {"v0": (3.7, 0.0, 0.0), "semi_axes": (390.0, 380.0, 365.0)}
+    return replace(case, problem=replace(case.problem, **moving))
 
 
 def bacchus(tof: float, name: str = "north_pole", r0: tuple[float, float, float] = (0.0, 0.0, 600.0)) -> Case:
@@ -148,6 +158,11 @@ def spread(near: int, rest: int) -> Chooser:
     return choose
 
 
+def these(*facets: int) -> Chooser:
+    """Chooser: facets that were chosen by hand."""
+    return lambda case, rng: list(facets)
+
+
 def tables() -> dict[str, Callable[[], list[tuple[Case, Chooser]]]]:
     """The tables by name: cases and how their facets are chosen."""
     places = {"north_pole": NORTH, "equator": EQUATOR, "mid_latitude": MIDDLE}
@@ -166,6 +181,10 @@ def tables() -> dict[str, Callable[[], list[tuple[Case, Chooser]]]]:
         ),
         "bennu_paper_thrust": lambda: over_bennu(700.0, spread(5, 3), final_thrust="paper"),
         "bennu_paper": lambda: over_bennu(900.0, spread(5, 3), **paper),
+        # reachable early, not in between, and later again
+        "bennu_approach": lambda: [
+            (bennu_approach(tof), these(*APPROACHED)) for tof in (425.0, 500.0, 650.0, 800.0)
+        ],
         "bacchus": lambda: [(bacchus(900.0), near_boundary(12, 4)), (bacchus(1600.0), far_side(12))],
         "bacchus_boundary": lambda: [
             (bacchus(900.0), near_boundary(20, 0, survey=60)),

@@ -54,6 +54,8 @@ def tell_facet(result: StateResult, facet: int) -> str:
     unknown = intervals[intervals["verdict"] == Verdict.UNRESOLVED]
     lost = sum(one.facet == facet for one in result.lost)
     parts = [_verdict(result, facet, reachable)]
+    if len(reachable) > 1:
+        parts.append(_in_between(result, facet, reachable))
     if len(unknown):
         parts.append(f"unresolved {', '.join(_stretch(row, result) for row in unknown)}")
     if lost:
@@ -95,6 +97,15 @@ def _verdict(result: StateResult, facet: int, reachable: Rows) -> str:
     proved = int(result.answers.proved[:, facet].sum())
     share = "proved" if proved == len(times) else f"proved at {proved} of them"
     return f"{told} not reachable {span} ({share})"
+
+
+def _in_between(result: StateResult, facet: int, reachable: Rows) -> str:
+    """Say how many of the grid's times between the intervals are proved out of reach."""
+    tof_s = result.grid.tof_s
+    within = (tof_s > reachable["begin_s"].min()) & (tof_s < reachable["end_s"].max())
+    gone = within & (result.answers.verdict[:, facet] == Verdict.UNREACHABLE)
+    proved = int(result.answers.proved[gone, facet].sum())
+    return f"unreachable at {int(gone.sum())} of the times asked in between, {proved} of them proved"
 
 
 def _stretch(row: Row, result: StateResult) -> str:

@@ -36,15 +36,15 @@ def several_figure(result: StateResult) -> Figure:
     gap_s = facets["last_tof_s"] - facets["first_tof_s"] - facets["reachable_s"]
     several = np.flatnonzero(facets["intervals"] > 1)
     shown = several[np.argsort(-gap_s[several], kind="stable")[:MOST_BARS]]
-    height = 1.35 + 0.17 * len(shown)
+    height = 1.55 + 0.17 * len(shown)
     figure = plotting.new_figure(7.2, height)
     of = "" if len(shown) == len(several) else f"; the {len(shown)} with the longest gaps"
     plotting.add_title(
         figure,
         f"{body_name(result.case)}, {result.case.name.replace('_', ' ')}: longer is not always easier",
-        f"{len(several)} facets are reachable in several intervals{of}; {craft_facts(result.case)}",
+        f"{len(several)} facets are reachable in several intervals{of}\n{craft_facts(result.case)}",
     )
-    axes = figure.add_axes((0.10, 0.52 / height, 0.86, 1.0 - 1.25 / height))
+    axes = figure.add_axes((0.10, 0.52 / height, 0.86, 1.0 - 1.45 / height))
     for row, facet in enumerate(shown.tolist()):
         _draw_bars(axes, intervals_of_facet(result, facet), float(row), plotting.BLUE)
     axes.set_yticks(range(len(shown)), [str(facet) for facet in shown], fontsize=7)
