@@ -30,9 +30,9 @@ def reference(folder: Path) -> Any:
     return Reference.make(TOY, folder)
 
 
-def test_ten_killed_runs_resume_to_the_undisturbed_result(reference: Any, folder: Path) -> None:
-    for tally in kill_runs(reference, 10, folder, seed=1):
-        assert tally.tried == 5
+def test_eight_killed_runs_resume_to_the_undisturbed_result(reference: Any, folder: Path) -> None:
+    for tally in kill_runs(reference, 8, folder, seed=1):
+        assert tally.tried == 4
         assert not tally.failures
 
 
@@ -56,6 +56,6 @@ def test_every_hostile_scenario_and_shape_is_told_by_name_at_little_cost() -> No
 
 
 def test_a_forged_result_is_refused_or_harmless(folder: Path) -> None:
-    tally = forge_results(folder, every=300)
+    tally = forge_results(folder, every=600)
     assert not tally.failures
-    assert tally.tried >= 4
+    assert tally.tried >= 2
