@@ -11,7 +11,8 @@ from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import path_clearance
 from landing_cli.flight.extremal import thrust_ratio
 from landing_cli.kernel import inlined, kernel
-from landing_cli.reach.costate_dynamics import MAX_SPLITS, fly_extremal
+from landing_cli.kernel_address import call
+from landing_cli.reach.costate_dynamics import MAX_SPLITS
 from landing_cli.reach.delivery import CLEARANCE_SPACING, LIMIT_TOLERANCE, Deliveries, Frame
 from landing_cli.reach.ellipsoid_dips import LEVEL, find_dips
 from landing_cli.reach.extremal_facet import Flight, new_flight, start_extremal
@@ -32,7 +33,7 @@ def _measure_descent(
     field, extremal = problem.field, flight.extremal
     level2, peak = 1e9, 0.0
     for d in range(find_dips(field.inverse_axes, extremal, steps, flight.dips)):
-        level2 = min(level2, flight.dips[d, LEVEL] ** 2)
+        level2 = min(level2, flight.dips.places[d, LEVEL] ** 2)
     for k in range(steps + 1):
         y = extremal.state[k]
         square = 0.0
@@ -60,7 +61,7 @@ def _deliver(
     """Fly one facet's extremal at fine steps and measure it; see ``delivery.Deliveries``."""
     scale = problem.field.scale
     start_extremal(problem, costates, flight.extremal)
-    steps = fly_extremal(problem.field, DELIVERY_STEPS, flight.extremal)
+    steps = call(flight.fly, (problem.field, flight.extremal))
     margin, peak = _measure_descent(problem, flight, steps, path_m)
     end = flight.extremal.state[steps]
     off_ellipsoid = 0.0
@@ -100,7 +101,6 @@ def _deliver(
     values[9] = excess if excess > LIMIT_TOLERANCE else 0.0
 
 
-@kernel
 def deliver_extremals(
     problem: ExtremalProblem,
     frame: Frame,
@@ -129,8 +129,24 @@ def deliver_extremals(
     out : Deliveries
         Filled.
     """
-    flight = new_flight(DELIVERY_STEPS)
+    flight = new_flight(problem.field, DELIVERY_STEPS)
     path_m = np.empty((DELIVERY_STEPS + MAX_SPLITS + 1 + ARC_SAMPLES, 3))
+    fill_deliveries(problem, frame, surface, costates, targets_m, normals, flight, path_m, out)
+
+
+@kernel
+def fill_deliveries(
+    problem: ExtremalProblem,
+    frame: Frame,
+    surface: SurfaceIndex,
+    costates: Floats,
+    targets_m: Floats,
+    normals: Floats,
+    flight: Flight,
+    path_m: Floats,
+    out: Deliveries,
+) -> None:
+    """Deliver a batch of facets, with room for a flight and its path; see :func:`deliver_extremals`."""
     for i in range(costates.shape[0]):
         _deliver(
             problem,

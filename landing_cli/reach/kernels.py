@@ -46,9 +46,9 @@ def are_compiled(descent: str, terrain: str = "report") -> bool:
     if terrain == "require":
         kernels += [signed_distances_into, first_hits_into]
     if descent == "extremal":
-        from landing_cli.reach.extremal_descent import search_batch
+        from landing_cli.reach.extremal_kernels import KERNELS
 
-        kernels.append(search_batch)
+        kernels += KERNELS
     return all(is_cached(kernel) for kernel in kernels)
 
 
@@ -71,7 +71,9 @@ def compile_parts(case: LandingCase) -> None:
     # the longest first
     parts = [_flight, _conic, _solve, _delivery, _verdicts, _ellipsoid_arcs, lambda _: survey(case)]
     if case.descent == "extremal":
-        parts.insert(0, _extremals)
+        from landing_cli.reach.extremal_kernels import PARTS
+
+        parts[:0] = PARTS
     if case.terrain == "require":
         parts.append(_terrain)
     with np.errstate(all="ignore"):
@@ -140,10 +142,3 @@ def _solve(prepared: PreparedCase) -> None:
     batch = no_cuts(1, n), np.ones(1), no_walls(1), 1.0, True, 1, 1
     arguments = case, one, one, *batch, prepared.coarse_tube, 1.0, False, _solver(prepared), new_batch(1, n)
     solve_many.compile(tuple(_typeof(argument) for argument in arguments))
-
-
-def _extremals(prepared: PreparedCase) -> None:
-    """The paper's extremals."""
-    from landing_cli.reach.extremal_descent import solve_prepared
-
-    solve_prepared(prepared, np.zeros(1, dtype=np.int64))
