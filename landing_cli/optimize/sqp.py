@@ -183,13 +183,13 @@ def propose(
     solve_elastic_qp(qp, rows, step_and_pool, duals)
     for a in range(n):
         step[a] = step_and_pool[a]
-    rows = 1
+    row = 1
     for i in range(m):
         after[i] = model.values[i]
         for j in range(n):
             after[i] += model.jacobian[i, j] * step[j]
-        multipliers[i] = duals[rows] - (duals[rows + 1] if model.equality[i] else 0.0)
-        rows += 2 if model.equality[i] else 1
+        multipliers[i] = duals[row] - (duals[row + 1] if model.equality[i] else 0.0)
+        row += 2 if model.equality[i] else 1
     expected = violation(model.values, model.equality, model.pooled, m)
     expected = price * (expected - violation(after, model.equality, model.pooled, m))
     for a in range(n):

@@ -9,9 +9,9 @@ import numpy as np
 
 from landing_cli.optimize.sqp import propose
 from landing_cli.reach.costate_dynamics import fly_extremal
-from landing_cli.reach.delivery import new_deliveries
-from landing_cli.reach.extremal_delivery import deliver_extremals, fill_deliveries
-from landing_cli.reach.extremal_facet import renew_model, try_costates
+from landing_cli.reach.delivery import measure_of, new_deliveries
+from landing_cli.reach.extremal_delivery import fill_deliveries
+from landing_cli.reach.extremal_facet import new_flight, renew_model, try_costates
 from landing_cli.reach.extremal_search import Searcher, new_found, new_searcher, search_batch
 from landing_cli.reach.extremal_terms import ExtremalProblem, extremal_problem
 from landing_cli.reach.free_descent import PreparedCase
@@ -57,16 +57,12 @@ def _extremal_search(prepared: PreparedCase) -> None:
 def _extremal_delivery(prepared: PreparedCase) -> None:
     """The accurate flight of an extremal and its measures."""
     problem, _ = _searcher(prepared)
-    shared, first = prepared.shared, slice(0, 1)
-    deliver_extremals(
-        problem,
-        prepared.frame,
-        shared.surface,
-        np.zeros((1, 7)),
-        shared.centroids_m[first],
-        shared.normals[first],
-        new_deliveries(1),
-    )
+    frame, surface, one = prepared.frame, prepared.shared.surface, np.ones((1, 3))
+    measure = measure_of(frame, surface, problem.field.kind, problem.field.params)
+    flight = new_flight(problem.field, 1)
+    work = flight, np.empty((1, 3)), measure, new_deliveries(1)
+    arguments = problem, frame, surface, np.zeros((1, 7)), one, one, *work
+    fill_deliveries.compile(tuple(_typeof(argument) for argument in arguments))
 
 
 # the longest first

@@ -111,7 +111,8 @@ def extremal_problem(case: LandingCase) -> ExtremalProblem:
     inverse_axes = scale.length_m / np.array(case.ellipsoid_m, dtype=np.float64)
     bound = craft.propellant_kg
     return ExtremalProblem(
-        field=Field(gravity.kind, gravity.params, scale, inverse_axes),
+        # writable, as they come out of a pickle
+        field=Field(gravity.kind, gravity.params.copy(), scale, inverse_axes),
         position=np.array(case.position_m, dtype=np.float64) / scale.length_m,
         velocity=np.array(case.velocity_m_s, dtype=np.float64) * scale.time_s / scale.length_m,
         final_time=case.final_stage_s / case.descent_s,
