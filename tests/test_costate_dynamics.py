@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from kernel_calls import from_python
+from kernel_calls import from_python, used
 from numpy.testing import assert_allclose
 
 from landing_cli.body.gravity.harmonics import harmonics_field
@@ -13,19 +13,16 @@ from landing_cli.flight.extremal import extremal_scale, scaled_start
 from landing_cli.flight.gauss import fly_sampled
 from landing_cli.flight.legs import CostateLeg
 from landing_cli.reach.costate_dynamics import (
-    COLUMNS,
     CORE,
-    MAX_SPLITS,
-    STATE,
     Extremal,
     Field,
     fly_extremal as fly_extremal_part,
-    new_extremal as new_extremal_part,
+    new_extremal,
+    new_tangents,
     tangents as tangents_part,
 )
 
 fly_extremal = from_python(fly_extremal_part)
-new_extremal = from_python(new_extremal_part)
 tangents = from_python(tangents_part)
 
 SPIN = 2.0 * np.pi / (4.288 * 3600.0)
@@ -43,9 +40,10 @@ COSTATES = {"throttled": THROTTLED, "saturates": SATURATES, "reverses": REVERSES
 
 
 def fly(costates: np.ndarray, n_steps: int = 30) -> tuple[Extremal, int]:
-    extremal = new_extremal(n_steps)
+    extremal = used(new_extremal(n_steps))
+    extremal.state[0, 14] = 0.0
     extremal.state[0, :14] = scaled_start(SCALE, START, REST, costates)
-    return extremal, fly_extremal(FIELD, n_steps, extremal)
+    return extremal, fly_extremal(FIELD, extremal)
 
 
 def end(costates: np.ndarray, n_steps: int = 30) -> np.ndarray:
@@ -57,10 +55,11 @@ def end(costates: np.ndarray, n_steps: int = 30) -> np.ndarray:
 def test_tangents_are_those_of_the_discrete_map(name: str) -> None:
     costates = COSTATES[name]
     extremal, k = fly(costates)
-    X, nodes = np.zeros((STATE, COLUMNS)), np.zeros((30 + MAX_SPLITS + 1, 6, COLUMNS))
-    tangents(FIELD, extremal, k, X, nodes)
+    of = used(new_tangents(30))
+    tangents(FIELD, extremal, k, of)
+    X, nodes = of.end, of.nodes
     h = 2e-5 * np.abs(costates).max()
-    differences = np.zeros((STATE, 7))
+    differences = np.zeros((len(X), 7))
     for j, unit in enumerate(np.eye(7) * h):
         near = end(costates + unit) - end(costates - unit)
         far = end(costates + 2.0 * unit) - end(costates - 2.0 * unit)
@@ -102,8 +101,9 @@ def test_thirty_steps_arrive_where_the_independent_integrator_does(name: str, li
 def test_the_costates_are_the_gradient_of_the_energy(name: str) -> None:
     """dJ = -lambda . dx at the end, and dx x dlambda vanishes: the flow is symplectic."""
     extremal, k = fly(COSTATES[name], 120)
-    X, nodes = np.zeros((STATE, COLUMNS)), np.zeros((120 + MAX_SPLITS + 1, 6, COLUMNS))
-    tangents(FIELD, extremal, k, X, nodes)
+    of = used(new_tangents(120))
+    tangents(FIELD, extremal, k, of)
+    X = of.end
     S, P, costates = X[:7, :7], X[7:14, :7], extremal.state[k, 7:14]
     assert_allclose(X[14, :7], -costates @ S, rtol=0, atol=2e-5 * np.abs(costates @ S).max() + 1e-9)
     bracket = S.T @ P
@@ -113,7 +113,7 @@ def test_the_costates_are_the_gradient_of_the_energy(name: str) -> None:
 def test_within_the_core_gravity_is_that_of_its_surface() -> None:
     inside = new_extremal(30)
     inside.state[0, :14] = scaled_start(SCALE, [1.0, 0.0, 2.0], [0.0, 0.0, 0.0], 1e-9 * THROTTLED)
-    fly_extremal(FIELD, 30, inside)
+    fly_extremal(FIELD, inside)
     step = inside.step[0]
     pull = inside.state[1, 3:6] / step * SCALE.acceleration_m_s2
     at_the_core = 4.892 / (CORE * 266.0) ** 2

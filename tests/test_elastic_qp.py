@@ -5,17 +5,16 @@ from __future__ import annotations
 import clarabel
 import numpy as np
 import pytest
-from kernel_calls import from_python
+from kernel_calls import from_python, used
 from numpy.testing import assert_allclose
 from scipy import sparse
 
 from landing_cli.optimize.elastic_qp import (
     ElasticQP,
-    new_elastic_qp as new_elastic_qp_part,
+    new_elastic_qp,
     solve_elastic_qp as solve_elastic_qp_part,
 )
 
-new_elastic_qp = from_python(new_elastic_qp_part)
 solve_elastic_qp = from_python(solve_elastic_qp_part)
 
 N, M = 7, 12
@@ -96,3 +95,13 @@ def test_hopeless_rows_at_a_high_price_still_give_a_finite_answer() -> None:
     assert np.all(np.isfinite(d)) and np.all(np.isfinite(multipliers))
     assert_allclose(multipliers, qp.price, rtol=1e-6)
     assert_allclose(d, qp.radius * np.sign(qp.rows.T @ qp.price), rtol=1e-6)
+
+
+def test_nothing_is_left_over_from_the_program_before() -> None:
+    data = "hessian", "gradient", "rows", "values", "price", "radius"
+    answers = []
+    for qp in (random_program(3), used(random_program(3), *data)):
+        d, multipliers = np.zeros(N), np.zeros(M)
+        solve_elastic_qp(qp, M, d, multipliers)
+        answers.append((d, multipliers))
+    assert all(map(np.array_equal, *answers))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kernel_calls import from_python
+from kernel_calls import from_python, used
 from landing_samples import landing_case
 from numpy.testing import assert_allclose
 
@@ -14,18 +14,16 @@ from landing_cli.flight.extremal import scaled_start
 from landing_cli.flight.legs import FinalArcLeg
 from landing_cli.flight.replay import replay
 from landing_cli.reach.costate_dynamics import (
-    COLUMNS,
-    MAX_SPLITS,
-    STATE,
     fly_extremal as fly_extremal_part,
-    new_extremal as new_extremal_part,
+    new_extremal,
+    new_tangents,
     tangents as tangents_part,
 )
 from landing_cli.reach.ellipsoid_dips import (
     LEVEL,
     dip_row as dip_row_part,
     find_dips as find_dips_part,
-    new_dips as new_dips_part,
+    new_dips,
 )
 from landing_cli.reach.extremal_terms import (
     MAX_ROWS,
@@ -39,6 +37,7 @@ from landing_cli.reach.extremal_terms import (
     final_energy as final_energy_part,
     handover_hessian as handover_hessian_part,
     handover_rows as handover_rows_part,
+    new_arc_work,
 )
 
 dip_row = from_python(dip_row_part)
@@ -47,8 +46,6 @@ find_dips = from_python(find_dips_part)
 fly_extremal = from_python(fly_extremal_part)
 handover_hessian = from_python(handover_hessian_part)
 handover_rows = from_python(handover_rows_part)
-new_dips = from_python(new_dips_part)
-new_extremal = from_python(new_extremal_part)
 tangents = from_python(tangents_part)
 
 TARGET_M, NORMAL = np.array([120.0, 60.0, 210.0]), np.array([0.36, 0.48, 0.8])
@@ -65,10 +62,10 @@ def handover_state(problem: ExtremalProblem) -> np.ndarray:
     return np.concatenate([r / scale.length_m, v * scale.time_s / scale.length_m, [m]])
 
 
-def rows_at(problem: ExtremalProblem, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def rows_at(problem: ExtremalProblem, x: np.ndarray, guard: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     values, jacobian = np.zeros(MAX_ROWS), np.zeros((ROW_MASS, 7))
     target = TARGET_M / problem.field.scale.length_m
-    handover_rows(problem, target, NORMAL, x, values, jacobian)
+    handover_rows(problem, guard, target, NORMAL, x, values, jacobian, used(new_arc_work()))
     return values[:ROW_MASS], jacobian
 
 
@@ -120,7 +117,7 @@ def test_in_the_papers_reading_the_bound_is_on_the_total_acceleration_alone() ->
 def test_the_guard_is_kept_from_the_thrust_rows_alone() -> None:
     problem = problem_of()
     x = handover_state(problem)
-    change = rows_at(problem._replace(guard=1e-3), x)[0] - rows_at(problem, x)[0]
+    change = rows_at(problem, x, 1e-3)[0] - rows_at(problem, x)[0]
     assert_allclose(change[:N_ARC], -1e-3, rtol=1e-9)
     assert np.all(change[N_ARC:] == 0.0)
 
@@ -168,7 +165,7 @@ def test_the_handovers_hessian_is_the_derivative_of_its_gradient_without_gravity
         return (of_final - multipliers[:ROW_MASS] @ rows_at(problem, y)[1])[:6]
 
     K = np.zeros((7, 7))
-    handover_hessian(problem, target, x, multipliers, K)
+    handover_hessian(problem, target, x, multipliers, K, used(new_arc_work()))
     expected = differences(gradient, x)[:, :6]
     assert_allclose(K[:6, :6], expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
@@ -179,9 +176,9 @@ PUSHES = np.array([-0.4, -1.8, 1.2, -0.3, -0.6, 0.8, 0.4])
 
 def fly_by(problem: ExtremalProblem, costates: np.ndarray, n_steps: int = 30) -> tuple[Any, int, Any, int]:
     case = landing_case(velocity_m_s=FLYBY_M_S)
-    extremal, dips = new_extremal(n_steps), new_dips()
+    extremal, dips = new_extremal(n_steps), used(new_dips())
     extremal.state[0, :14] = scaled_start(problem.field.scale, case.position_m, case.velocity_m_s, costates)
-    k = fly_extremal(problem.field, n_steps, extremal)
+    k = fly_extremal(problem.field, extremal)
     return extremal, k, dips, find_dips(problem.field.inverse_axes, extremal, k, dips)
 
 
@@ -192,12 +189,11 @@ def test_a_dip_is_the_least_distance_from_the_ellipsoid_and_its_derivative_agree
     fine, steps, _, _ = fly_by(problem, PUSHES, 3000)
     levels = np.linalg.norm(fine.state[: steps + 1, :3] * problem.field.inverse_axes, axis=1)
     assert 5 < np.argmin(levels) < steps - 5
-    assert_allclose(dips[0, LEVEL], levels.min(), rtol=0, atol=1e-5)
-    X, nodes = np.zeros((STATE, COLUMNS)), np.zeros((30 + MAX_SPLITS + 1, 6, COLUMNS))
-    tangents(problem.field, extremal, k, X, nodes)
-    row, hessian = np.zeros(7), np.zeros((7, 7))
-    dip_row(problem.field.inverse_axes, extremal, nodes, dips[0], row, 1.0, hessian)
-    by_differences = differences(lambda c: fly_by(problem, c)[2][0, LEVEL], PUSHES, 1e-5)
+    assert_allclose(dips.places[0, LEVEL], levels.min(), rtol=0, atol=1e-5)
+    of, row, hessian = new_tangents(30), np.zeros(7), np.zeros((7, 7))
+    tangents(problem.field, extremal, k, of)
+    dip_row(problem.field.inverse_axes, extremal, of.nodes, dips, 0, row, 1.0, hessian)
+    by_differences = differences(lambda c: fly_by(problem, c)[2].places[0, LEVEL], PUSHES, 1e-5)
     assert_allclose(row, by_differences, rtol=0, atol=1e-6)
     assert_allclose(hessian, hessian.T, rtol=0, atol=1e-9)
 
@@ -214,9 +210,9 @@ def test_a_dips_hessian_is_exact_where_the_path_is_linear_in_the_costates() -> N
     def row_at(c: np.ndarray, hessian: np.ndarray) -> np.ndarray:
         extremal, k, dips, count = fly_by(problem, c)
         assert count == 1 and not extremal.saturated[:k].any()
-        X, nodes, row = np.zeros((STATE, COLUMNS)), np.zeros((30 + MAX_SPLITS + 1, 6, COLUMNS)), np.zeros(7)
-        tangents(problem.field, extremal, k, X, nodes)
-        dip_row(problem.field.inverse_axes, extremal, nodes, dips[0], row, 1.0, hessian)
+        of, row = new_tangents(30), np.zeros(7)
+        tangents(problem.field, extremal, k, of)
+        dip_row(problem.field.inverse_axes, extremal, of.nodes, dips, 0, row, 1.0, hessian)
         return row
 
     hessian = np.zeros((7, 7))

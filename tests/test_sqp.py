@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from kernel_calls import from_python
+from kernel_calls import from_python, used
 from numpy.testing import assert_allclose
 
 from landing_cli.optimize.sqp import (
     LocalModel,
     add_secant as add_secant_part,
     convexify as convexify_part,
-    new_local_model as new_local_model_part,
+    new_local_model,
     propose as propose_part,
     violation as violation_part,
 )
@@ -20,7 +20,6 @@ violation = from_python(violation_part)
 
 add_secant = from_python(add_secant_part)
 convexify = from_python(convexify_part)
-new_local_model = from_python(new_local_model_part)
 propose = from_python(propose_part)
 
 
@@ -37,19 +36,22 @@ def test_convexify_keeps_eigenvectors_and_sizes_and_turns_signs() -> None:
     vectors = np.linalg.qr(rng.normal(size=(7, 7)))[0]
     eigenvalues = np.array([-3.0, -1e-3, 0.2, 1.0, 5.0, 40.0, 0.0])
     matrix = (vectors * eigenvalues) @ vectors.T
-    convexify(matrix)
+    model = new_local_model(7, 0)
+    model.hessian[:] = matrix
+    convexify(model)
     expected = np.maximum(np.abs(eigenvalues), 1e-8 * 40.0)
-    found = (vectors.T @ matrix @ vectors).diagonal()
+    found = (vectors.T @ model.hessian @ vectors).diagonal()
     assert_allclose(found[:6], expected[:6], rtol=1e-9)
-    assert np.linalg.eigvalsh(matrix)[0] > 0.0
+    assert np.linalg.eigvalsh(model.hessian)[0] > 0.0
 
 
 def test_convexify_leaves_a_positive_matrix_alone() -> None:
     root = np.random.default_rng(2).normal(size=(7, 7))
     matrix = root @ root.T + np.eye(7)
-    before = matrix.copy()
-    convexify(matrix)
-    assert np.array_equal(matrix, before)
+    model = new_local_model(7, 0)
+    model.hessian[:] = matrix
+    convexify(model)
+    assert np.array_equal(model.hessian, matrix)
 
 
 def test_the_secant_update_is_exact_along_its_step_and_recovers_a_constant_matrix() -> None:
@@ -80,7 +82,7 @@ def test_a_loop_of_proposals_finds_the_constrained_optimum() -> None:
     x, multipliers, step = np.array([1.5, 0.4, 0.9]), np.zeros(2), np.zeros(3)
     for _ in range(12):
         sphere_model(x, multipliers, model)
-        convexify(model.hessian)
+        convexify(model)
         expected = propose(model, 2, 10.0, np.full(3, 0.3), step, multipliers)
         assert expected > -1e-9
         x += step
@@ -114,3 +116,14 @@ def test_a_deep_pool_counts_by_its_worst_row_however_deep() -> None:
     assert_allclose(step, 2.0, rtol=1e-6)
     assert_allclose(expected, 10.0 * 2.0 - 0.5 * 4.0, rtol=1e-6)
     assert_allclose(multipliers, [10.0, 0.0, 0.0], rtol=0, atol=1e-4)
+
+
+def test_a_model_that_was_used_before_proposes_as_a_new_one() -> None:
+    data = "gradient", "hessian", "jacobian", "values"
+    steps = []
+    for model in (new_local_model(3, 2), used(new_local_model(3, 2), *data)):
+        sphere_model(np.array([1.5, 0.4, 0.9]), np.zeros(2), model)
+        convexify(model)
+        steps.append(np.zeros(3))
+        propose(model, 2, 10.0, np.full(3, 0.3), steps[-1], np.zeros(2))
+    assert np.array_equal(*steps)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.kernel import inlined, part
+from landing_cli.kernel_record import by_reference
 from landing_cli.optimize.small_dense import cholesky, cholesky_solve
 
 Floats = NDArray[np.float64]
@@ -28,6 +29,7 @@ TOLERANCE = 1e-11  # of the mean complementarity, relative to what the rows can 
 FRACTION_TO_BOUNDARY = 0.995
 
 
+@by_reference
 class ElasticQP(NamedTuple):
     """The data of the program; n unknowns, m rows."""
 
@@ -37,19 +39,31 @@ class ElasticQP(NamedTuple):
     values: Floats  # (m,)
     price: Floats  # (m,) positive; infinite for a row that must hold
     radius: Floats  # (n,) positive
+    work: Floats  # (9, m + 2 n), and what follows: scratch space
+    factor: Floats  # (n, n)
+    step: Floats  # (n,)
 
 
-# The iterate and its step, one line each of an array (9, m + 2 n): rows first, then the box's two sides.
+# The iterate and its step, one line each of the work space: rows first, then the box's two sides.
 SLACK, GIVE, DUAL, LEFT, WEIGHT, SHIFT, D_SLACK, D_GIVE, D_DUAL = range(9)
 # GIVE is t. LEFT is the price less the multiplier, kept by itself because the difference would lose its
 # digits. Rows that do not give way, the box among them, have GIVE 0 and LEFT infinite, and every formula
 # below holds for them too. WEIGHT is D = 1 / (slack / dual + give / left).
 
 
-@part
 def new_elastic_qp(n: int, m: int) -> ElasticQP:
     """A zeroed program with room for n unknowns and m rows."""
-    return ElasticQP(np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m), np.ones(m), np.ones(n))
+    return ElasticQP(
+        np.zeros((n, n)),
+        np.zeros(n),
+        np.zeros((m, n)),
+        np.zeros(m),
+        np.ones(m),
+        np.ones(n),
+        np.zeros((9, m + 2 * n)),
+        np.zeros((n, n)),
+        np.zeros(n),
+    )
 
 
 @part
@@ -76,9 +90,9 @@ def _add_rows(qp: ElasticQP, m: int, weights: Floats, out: Floats) -> None:
 
 
 @inlined
-def _factor(qp: ElasticQP, m: int, w: Floats, M: Floats) -> None:
+def _factor(qp: ElasticQP, m: int) -> None:
     """Factor H + A' D A."""
-    n = qp.gradient.shape[0]
+    n, w, M = qp.gradient.shape[0], qp.work, qp.factor
     for i in range(m + 2 * n):
         w[WEIGHT, i] = 1.0 / (w[SLACK, i] / w[DUAL, i] + w[GIVE, i] / w[LEFT, i])
     for a in range(n):
@@ -92,18 +106,9 @@ def _factor(qp: ElasticQP, m: int, w: Floats, M: Floats) -> None:
 
 
 @part
-def _direction(
-    qp: ElasticQP,
-    m: int,
-    d: Floats,
-    target: float,
-    second: bool,
-    w: Floats,
-    factor: Floats,
-    step: Floats,
-) -> None:
+def _direction(qp: ElasticQP, m: int, d: Floats, target: float, second: bool) -> None:
     """Newton direction towards complementarity ``target``; ``second`` adds the corrector's products."""
-    n = d.shape[0]
+    n, w, step = d.shape[0], qp.work, qp.step
     for i in range(m + 2 * n):
         by_slack, by_give = target / w[DUAL, i], target / w[LEFT, i]
         if second:
@@ -123,7 +128,7 @@ def _direction(
     for i in range(m + 2 * n):
         w[D_DUAL, i] = w[DUAL, i] - w[WEIGHT, i] * w[SHIFT, i]
     _add_rows(qp, m, w[D_DUAL], step)
-    cholesky_solve(factor, n, step)
+    cholesky_solve(qp.factor, n, step)
     for i in range(m + 2 * n):
         change = -w[WEIGHT, i] * (_row_dot(qp, m, i, step) + w[SHIFT, i])
         w[D_DUAL, i] = change
@@ -132,10 +137,10 @@ def _direction(
 
 
 @part
-def _longest(w: Floats) -> float:
+def _longest(w: Floats, size: int) -> float:
     """Longest step that keeps slacks and multipliers inside."""
     longest = 1e30
-    for i in range(w.shape[1]):
+    for i in range(size):
         if w[D_SLACK, i] < 0.0:
             longest = min(longest, -w[SLACK, i] / w[D_SLACK, i])
         if w[D_DUAL, i] < 0.0:
@@ -148,10 +153,10 @@ def _longest(w: Floats) -> float:
 
 
 @part
-def _gap(w: Floats, step: float) -> float:
+def _gap(w: Floats, size: int, step: float) -> float:
     """Mean complementarity after a step along the current direction."""
     total, count = 0.0, 0
-    for i in range(w.shape[1]):
+    for i in range(size):
         dual = w[DUAL, i] + step * w[D_DUAL, i]
         total += (w[SLACK, i] + step * w[D_SLACK, i]) * dual
         count += 1
@@ -182,8 +187,10 @@ def solve_elastic_qp(qp: ElasticQP, m: int, d: Floats, multipliers: Floats) -> i
         Iterations; ``MAX_ITERATIONS`` when the tolerance was not reached.
     """
     n = d.shape[0]
-    size = m + 2 * n
-    w, matrix, step = np.zeros((9, size)), np.zeros((n, n)), np.zeros(n)
+    size, w, step = m + 2 * n, qp.work, qp.step
+    first, second = np.bool_(False), np.bool_(True)
+    for i in range(size):
+        w[GIVE, i] = w[D_SLACK, i] = w[D_GIVE, i] = w[D_DUAL, i] = 0.0
     for j in range(n):
         d[j] = 0.0
     cost = 1.0
@@ -198,15 +205,15 @@ def solve_elastic_qp(qp: ElasticQP, m: int, d: Floats, multipliers: Floats) -> i
         w[SLACK, m + j] = w[SLACK, m + n + j] = qp.radius[j]
         w[DUAL, m + j] = w[DUAL, m + n + j] = 0.05 / qp.radius[j]
         w[LEFT, m + j] = w[LEFT, m + n + j] = math.inf
-    mu, iterations = _gap(w, 0.0), 0
+    mu, iterations = _gap(w, size, 0.0), 0
     while iterations < MAX_ITERATIONS:
         iterations += 1
-        _factor(qp, m, w, matrix)
-        _direction(qp, m, d, 0.0, False, w, matrix, step)
-        length = min(1.0, _longest(w))
-        ratio = _gap(w, length) / mu
-        _direction(qp, m, d, mu * ratio**3, True, w, matrix, step)
-        length = min(1.0, FRACTION_TO_BOUNDARY * _longest(w))
+        _factor(qp, m)
+        _direction(qp, m, d, 0.0, first)
+        length = min(1.0, _longest(w, size))
+        ratio = _gap(w, size, length) / mu
+        _direction(qp, m, d, mu * ratio**3, second)
+        length = min(1.0, FRACTION_TO_BOUNDARY * _longest(w, size))
         if not length > SHORTEST:  # rounding has the last word
             break
         for j in range(n):
@@ -216,7 +223,7 @@ def solve_elastic_qp(qp: ElasticQP, m: int, d: Floats, multipliers: Floats) -> i
             w[GIVE, i] += length * w[D_GIVE, i]
             w[DUAL, i] += length * w[D_DUAL, i]
             w[LEFT, i] -= length * w[D_DUAL, i]
-        mu = _gap(w, 0.0)
+        mu = _gap(w, size, 0.0)
         if mu < TOLERANCE * cost:
             break
     for i in range(m):

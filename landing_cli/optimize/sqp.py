@@ -18,8 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.kernel import inlined, part
-from landing_cli.optimize.elastic_qp import new_elastic_qp, solve_elastic_qp
+from landing_cli.kernel import inlined, inner, part
+from landing_cli.kernel_record import by_reference
+from landing_cli.optimize.elastic_qp import ElasticQP, new_elastic_qp, solve_elastic_qp
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +28,7 @@ Floats = NDArray[np.float64]
 FLAT = 1e-8
 
 
+@by_reference
 class LocalModel(NamedTuple):
     """The problem at the current point; n unknowns, room for m rows."""
 
@@ -36,9 +38,14 @@ class LocalModel(NamedTuple):
     values: Floats  # (m,)
     equality: NDArray[np.bool_]  # (m,)
     pooled: NDArray[np.bool_]  # (m,) no equality; their violation is that of the worst of them
+    program: ElasticQP  # and what follows: scratch space
+    step_and_pool: Floats  # (n + 1,)
+    duals: Floats  # (2 m + 1,)
+    after: Floats  # (m,)
+    rotated: Floats  # (n, n)
+    axes: Floats  # (n, n)
 
 
-@part
 def new_local_model(n: int, m: int) -> LocalModel:
     """A zeroed model."""
     return LocalModel(
@@ -48,6 +55,12 @@ def new_local_model(n: int, m: int) -> LocalModel:
         np.zeros(m),
         np.zeros(m, dtype=np.bool_),
         np.zeros(m, dtype=np.bool_),
+        new_elastic_qp(n + 1, 2 * m + 1),  # one more unknown for the pool, two rows for an equality
+        np.zeros(n + 1),
+        np.zeros(2 * m + 1),
+        np.zeros(m),
+        np.zeros((n, n)),
+        np.zeros((n, n)),
     )
 
 
@@ -66,18 +79,16 @@ def violation(values: Floats, equality: NDArray[np.bool_], pooled: NDArray[np.bo
 
 
 @part
-def convexify(matrix: Floats) -> None:
-    """Turn negative curvature into positive curvature of the same size, in place.
+def convexify(model: LocalModel) -> None:
+    """Turn negative curvature of the Hessian into positive curvature of the same size.
 
     Jacobi's rotations give the eigenvalues of the small symmetric matrix.
     """
-    n = matrix.shape[0]
-    A, V = np.zeros((n, n)), np.zeros((n, n))
-    scale = 0.0
+    matrix, A, V = model.hessian, model.rotated, model.axes
+    n, scale = matrix.shape[0], 0.0
     for a in range(n):
-        V[a, a] = 1.0
         for b in range(n):
-            A[a, b] = matrix[a, b]
+            A[a, b], V[a, b] = matrix[a, b], 1.0 if a == b else 0.0
             scale = max(scale, abs(A[a, b]))
     for _ in range(12):
         off = 0.0
@@ -121,7 +132,7 @@ def _rotate(A: Floats, V: Floats, p: int, q: int) -> None:
         V[k, p], V[k, q] = c * x - s * y, s * x + c * y
 
 
-@part
+@inner
 def propose(
     model: LocalModel, m: int, price: float, radius: Floats, step: Floats, multipliers: Floats
 ) -> float:
@@ -139,7 +150,7 @@ def propose(
         Half-sides of the trust region.
     step : (n,) float
         Receives the step.
-    multipliers : (m,) float
+    multipliers : (m or more,) float
         Receives the rows' multipliers.
 
     Returns
@@ -148,7 +159,7 @@ def propose(
         How much the model expects the merit to fall.
     """
     n = step.shape[0]
-    qp = new_elastic_qp(n + 1, 2 * m + 1)  # one more unknown for the pool, two rows for an equality
+    qp, duals, step_and_pool, after = model.program, model.duals, model.step_and_pool, model.after
     for a in range(n):
         qp.gradient[a], qp.radius[a], qp.rows[0, a] = model.gradient[a], radius[a], 0.0
         for b in range(n):
@@ -156,7 +167,7 @@ def propose(
     qp.hessian[n, n], qp.gradient[n] = FLAT, price
     # the pool's violation is one more unknown: at least 0, and at least what each of its rows lacks
     qp.rows[0, n], qp.values[0], qp.price[0] = 1.0, 0.0, math.inf
-    rows, worst = 1, 0.0
+    rows, worst = np.int64(1), 0.0
     for i in range(m):
         for side in range(2 if model.equality[i] else 1):
             sign = 1.0 - 2.0 * side
@@ -169,18 +180,16 @@ def propose(
         if model.pooled[i]:
             worst = max(worst, -model.values[i])
     qp.radius[n] = 1.0 + 2.0 * worst
-    duals, step_and_pool = np.zeros(rows), np.zeros(n + 1)
     solve_elastic_qp(qp, rows, step_and_pool, duals)
     for a in range(n):
         step[a] = step_and_pool[a]
-    after = np.zeros(m)
-    rows = 1
+    row = 1
     for i in range(m):
         after[i] = model.values[i]
         for j in range(n):
             after[i] += model.jacobian[i, j] * step[j]
-        multipliers[i] = duals[rows] - (duals[rows + 1] if model.equality[i] else 0.0)
-        rows += 2 if model.equality[i] else 1
+        multipliers[i] = duals[row] - (duals[row + 1] if model.equality[i] else 0.0)
+        row += 2 if model.equality[i] else 1
     expected = violation(model.values, model.equality, model.pooled, m)
     expected = price * (expected - violation(after, model.equality, model.pooled, m))
     for a in range(n):
@@ -192,12 +201,10 @@ def propose(
 
 @part
 def add_secant(change: Floats, step: Floats, estimate: Floats) -> None:
-    """Symmetric rank-one update, so that ``estimate`` maps ``step`` to ``change``."""
-    n = step.shape[0]
-    miss = np.zeros(n)
+    """Symmetric rank-one update, so that ``estimate`` maps ``step`` to ``change``, which is overwritten."""
+    n, miss = step.shape[0], change
     along, miss2, step2 = 0.0, 0.0, 0.0
     for a in range(n):
-        miss[a] = change[a]
         for b in range(n):
             miss[a] -= estimate[a, b] * step[b]
         along += miss[a] * step[a]

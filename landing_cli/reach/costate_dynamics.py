@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from landing_cli.body.gravity.field import GravityKind
 from landing_cli.body.gravity.kernels import acceleration_and_gradient, curvature
 from landing_cli.flight.extremal import ExtremalScale, rates_in_gravity, thrust_ratio
-from landing_cli.kernel import inlined, part
+from landing_cli.kernel import inlined, inner, part
+from landing_cli.kernel_record import by_reference
 
 Floats = NDArray[np.float64]
 
@@ -32,6 +33,7 @@ SMALLEST_PART = 1.0 / 32.0  # of the step between two nodes
 CORE = 0.4
 
 
+@by_reference
 class Extremal(NamedTuple):
     """An extremal, step by step (scaled units, body frame)."""
 
@@ -39,8 +41,26 @@ class Extremal(NamedTuple):
     saturated: NDArray[np.bool_]  # (K,) whether the thrust is at its bound
     part: Floats  # (K,) the step's share of what was left to the next node; 0: it ends at a switch
     state: Floats  # (K + 1, 15)
+    rate: Floats  # (15,) scratch space
+    stage: Floats  # (15,) scratch space
 
 
+@by_reference
+class Tangents(NamedTuple):
+    """Derivatives of an extremal with respect to its initial costates."""
+
+    end: Floats  # (15, 8) of the last state; the eighth column is scratch
+    nodes: Floats  # (K + 1, 6, 8) of position and velocity at every node
+    rate: Floats  # (15,), and what follows: scratch space
+    stage: Floats  # (15,)
+    slope: Floats  # (15, 8)
+    of_stage: Floats  # (15, 8)
+    base: Floats  # (15, 8)
+    left: Floats  # (8,) of what is left to the next node
+    at_switch: Floats  # (8,)
+
+
+@by_reference
 class Field(NamedTuple):
     """Gravity and scales of a descent."""
 
@@ -50,7 +70,6 @@ class Field(NamedTuple):
     inverse_axes: Floats  # (3,) of the keep-out ellipsoid, scaled
 
 
-@part
 def new_extremal(n_steps: int) -> Extremal:
     """Room for an extremal of ``n_steps`` steps before splitting."""
     size = n_steps + MAX_SPLITS
@@ -59,6 +78,24 @@ def new_extremal(n_steps: int) -> Extremal:
         np.zeros(size, dtype=np.bool_),
         np.zeros(size),
         np.zeros((size + 1, STATE)),
+        np.zeros(STATE),
+        np.zeros(STATE),
+    )
+
+
+def new_tangents(n_steps: int) -> Tangents:
+    """Room for the tangents of such an extremal."""
+    shape = STATE, COLUMNS
+    return Tangents(
+        np.zeros(shape),
+        np.zeros((n_steps + MAX_SPLITS + 1, 6, COLUMNS)),
+        np.zeros(STATE),
+        np.zeros(STATE),
+        np.zeros(shape),
+        np.zeros(shape),
+        np.zeros(shape),
+        np.zeros(COLUMNS),
+        np.zeros(COLUMNS),
     )
 
 
@@ -132,26 +169,25 @@ def _step_to_switch(
     return h
 
 
-@part
-def fly_extremal(field: Field, n_steps: int, extremal: Extremal) -> int:
+@inner
+def fly_extremal(field: Field, extremal: Extremal) -> int:
     """Integrate from ``extremal.state[0]`` over unit time.
 
     Parameters
     ----------
     field : Field
         Gravity and scales.
-    n_steps : int
-        Equal steps before splitting.
     extremal : Extremal
-        The first state is given, energy 0; the rest is filled.
+        The first state is given, energy 0; the rest is filled. Its size sets the number of equal steps before
+        splitting.
 
     Returns
     -------
     int
         Number of steps taken, K.
     """
-    rate, stage = np.zeros(STATE), np.zeros(STATE)
-    flow = field.scale.flow
+    rate, stage = extremal.rate, extremal.stage
+    n_steps, flow = extremal.step.shape[0] - MAX_SPLITS, field.scale.flow
     saturated = thrust_ratio(flow, False, extremal.state[0])[0] > 1.0
     k = 0
     for n in range(n_steps):
@@ -243,7 +279,7 @@ def _tangent_rates(field: Field, saturated: bool, y: Floats, X: Floats, rate: Fl
 
 
 @part
-def tangents(field: Field, extremal: Extremal, n: int, X: Floats, node_tangents: Floats) -> None:
+def tangents(field: Field, extremal: Extremal, n: int, out: Tangents) -> None:
     """Derivatives of a flown extremal with respect to its initial costates.
 
     Parameters
@@ -254,34 +290,29 @@ def tangents(field: Field, extremal: Extremal, n: int, X: Floats, node_tangents:
         As filled by ``fly_extremal``.
     n : int
         Its number of steps.
-    X : (15, 8) float
-        Receives the derivatives of the last state; the eighth column is scratch.
-    node_tangents : (n + 1, 6, 8) float
-        Receives the derivatives of position and velocity at every node.
+    out : Tangents
+        Filled.
     """
-    rate, stage = np.zeros(STATE), np.zeros(STATE)
-    D, S, base = np.zeros((STATE, COLUMNS)), np.zeros((STATE, COLUMNS)), np.zeros((STATE, COLUMNS))
-    d_left = np.zeros(COLUMNS)  # of what is left to the next node
-    for i in range(STATE):
-        for j in range(COLUMNS):
+    X, d_left = out.end, out.left
+    for j in range(COLUMNS):
+        d_left[j] = 0.0
+        for i in range(STATE):
             X[i, j] = 1.0 if i == 7 + j and j < 7 else 0.0
-    _keep_node(X, node_tangents[0])
+    _keep_node(X, out.nodes[0])
     for k in range(n):
-        _tangent_step(
-            field, extremal.saturated[k], extremal.step[k], extremal.state[k], X, rate, stage, D, S, base
-        )
+        _tangent_step(field, extremal.saturated[k], extremal.step[k], extremal.state[k], out)
         if extremal.part[k] == 0.0:
-            _answer_of_switch(field.scale.flow, extremal.state[k + 1], X, d_left)
+            _answer_of_switch(field.scale.flow, extremal.state[k + 1], X, d_left, out.at_switch)
         else:
             for j in range(7):
                 dh = extremal.part[k] * d_left[j]
                 d_left[j] -= dh
                 for i in range(STATE):
                     X[i, j] += X[i, 7] * dh
-        _keep_node(X, node_tangents[k + 1])
+        _keep_node(X, out.nodes[k + 1])
 
 
-@inlined
+@part
 def _keep_node(X: Floats, node: Floats) -> None:
     """Copy the derivatives of position and velocity."""
     for i in range(6):
@@ -290,19 +321,9 @@ def _keep_node(X: Floats, node: Floats) -> None:
 
 
 @inlined
-def _tangent_step(
-    field: Field,
-    saturated: bool,
-    h: float,
-    y: Floats,
-    X: Floats,
-    rate: Floats,
-    stage: Floats,
-    D: Floats,
-    S: Floats,
-    base: Floats,
-) -> None:
+def _tangent_step(field: Field, saturated: bool, h: float, y: Floats, out: Tangents) -> None:
     """Carry the tangents through one RK4 step; the eighth column answers to the step's length."""
+    X, rate, stage, D, S, base = out.end, out.rate, out.stage, out.slope, out.of_stage, out.base
     for i in range(STATE):
         stage[i] = y[i]
         X[i, 7] = 0.0
@@ -322,10 +343,9 @@ def _tangent_step(
 
 
 @inlined
-def _answer_of_switch(flow: float, y: Floats, X: Floats, d_left: Floats) -> None:
+def _answer_of_switch(flow: float, y: Floats, X: Floats, d_left: Floats, slope: Floats) -> None:
     """Let the step's length answer, so that u stays 1 at its end."""
     _, norm = thrust_ratio(flow, False, y)
-    slope = np.zeros(COLUMNS)
     for j in range(COLUMNS):
         d_norm = (y[10] * X[10, j] + y[11] * X[11, j] + y[12] * X[12, j]) / norm
         slope[j] = d_norm / y[6] - norm / (y[6] * y[6]) * X[6, j] + flow * X[13, j]

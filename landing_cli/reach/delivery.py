@@ -8,19 +8,24 @@ and the limits are measured on that flight.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from landing_cli.body.bvh import SurfaceIndex
 from landing_cli.body.clearance import path_clearance
-from landing_cli.kernel import inlined, kernel, part
+from landing_cli.body.gravity.field import GravityKind
+from landing_cli.kernel import inlined, inner, kernel, part
+from landing_cli.kernel_address import Callee, call
 from landing_cli.kernel_lanes import WIDTH, lane
 from landing_cli.kernel_record import by_reference
 from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
 from landing_cli.reach.scaled_case import ScaledCase, least_between
 from landing_cli.reach.shooting import Flights, fly_some, new_flights
+
+_types: Any = types  # not typed
 
 Floats = NDArray[np.float64]
 
@@ -75,6 +80,87 @@ def new_deliveries(size: int) -> Deliveries:
     return Deliveries(np.full((size, len(VALUE_COLUMNS)), np.nan), np.full((size, 7), np.nan))
 
 
+class Descent(NamedTuple):
+    """What was measured on a flight before its final arc."""
+
+    steps: int  # where the path's final arc begins
+    energy_m2_s3: float
+    peak: float  # largest thrust ratio
+    margin: float  # least r' Re r - 1
+    off_ellipsoid: float  # how far the handover is from where it has to be
+    compensated: bool  # whether the thrust that is flown is bounded on the final arc, or m a*
+
+
+@inner
+def measure_landing(
+    frame: Frame,
+    surface: SurfaceIndex,
+    kind: GravityKind,
+    params: Floats,
+    descent: Descent,
+    handover: Floats,
+    target_m: Floats,
+    normal: Floats,
+    path_m: Floats,
+    values: Floats,
+) -> None:
+    """Fly the final arc in closed form and measure the whole landing.
+
+    Parameters
+    ----------
+    frame, surface : Frame, SurfaceIndex
+        Facts of the case, and the asteroid's surface.
+    kind, params : GravityKind, (p,) float
+        The gravity field.
+    descent : Descent
+        What is known already.
+    handover : (7,) float
+        See Deliveries.
+    target_m, normal : (3,) float
+        Touchdown point (m) and outward normal, body axes.
+    path_m : (descent.steps + 1 + ARC_SAMPLES or more, 3) float
+        The path in the body frame, m, up to the final arc, which is filled.
+    values : (10,) float
+        Filled; see Deliveries.
+    """
+    arc = measure_arc(
+        handover,
+        handover[6],
+        target_m,
+        normal,
+        frame.final_stage_s,
+        frame.rotation_rate_rad_s,
+        frame.exhaust_velocity_m_s,
+        kind,
+        params,
+        path_m[descent.steps :],
+    )
+    peak = descent.peak
+    peak_final = arc.peak_thrust_n if descent.compensated else arc.peak_planned_thrust_n
+    peak_final /= frame.thrust_max_n
+    glide = frame.half_angle_rad - arc.glide_angle_rad
+    fuel = frame.mass_kg - arc.touchdown_mass_kg
+    excess = max(peak - 1.0, peak_final - 1.0, -descent.margin, -glide, descent.off_ellipsoid)
+    excess = max(excess, fuel / frame.propellant_kg - 1.0)
+    path = path_m[: descent.steps + 1 + ARC_SAMPLES]
+    clearance, _facet = path_clearance(
+        surface, path, frame.clear_radius_m, 1e-3, CLEARANCE_SPACING * frame.clear_radius_m
+    )
+    values[0] = descent.energy_m2_s3 + arc.energy_m2_s3
+    values[1] = frame.exhaust_velocity_m_s * math.log(frame.mass_kg / arc.touchdown_mass_kg)
+    values[2] = fuel
+    values[3], values[4], values[5] = max(peak, peak_final), peak, peak_final
+    values[6], values[7], values[8] = descent.margin, math.degrees(glide), clearance
+    values[9] = excess if excess > LIMIT_TOLERANCE else 0.0
+
+
+def measure_of(frame: Frame, surface: SurfaceIndex, kind: GravityKind, params: Floats) -> Callee:
+    """Return `measure_landing` for these kinds of arguments."""
+    descent, path, numbers = Descent(0, 0.0, 0.0, 0.0, 0.0, False), np.empty((1, 3)), np.empty(1)
+    of_facet = descent, numbers, numbers, numbers, path, numbers
+    return Callee(measure_landing, _types.none, frame, surface, kind, params, *of_facet)
+
+
 @part
 def _to_body(case: ScaledCase, flights: Flights, place: int, path_m: Floats) -> float:
     """Fill body-frame positions of a lane, m; return the least r' Re r - 1 of the descent."""
@@ -110,6 +196,7 @@ def deliver(
     flights: Flights,
     place: int,
     path_m: Floats,
+    measure: Callee,
     values: Floats,
     handover: Floats,
 ) -> None:
@@ -129,6 +216,8 @@ def deliver(
         in this lane.
     path_m : (N DELIVERY_SUBSTEPS + 1 + ARC_SAMPLES, 3) float
         Filled with the path from start to touchdown, body frame, m.
+    measure : Callee
+        See measure_of.
     values, handover : (10,) float, (7,) float
         Filled; see Deliveries.
     """
@@ -156,35 +245,17 @@ def deliver(
         square = thrust[k, 0] ** 2 + thrust[k, 1] ** 2 + thrust[k, 2] ** 2
         energy += 0.5 * square / n
         peak = max(peak, math.sqrt(square))
-    handover_mass = end[6] * frame.mass_kg
-    arc = measure_arc(
-        handover,
-        handover_mass,
-        target_m,
-        normal,
-        frame.final_stage_s,
-        frame.rotation_rate_rad_s,
-        frame.exhaust_velocity_m_s,
-        case.gravity_kind,
-        case.gravity_params,
-        path_m[steps:],
+    handover[6] = end[6] * frame.mass_kg
+    descent = Descent(
+        steps,
+        energy * case.acceleration_m_s2**2 * frame.descent_s,
+        peak,
+        margin,
+        off_ellipsoid,
+        case.compensated,
     )
-    peak_final = arc.peak_thrust_n if case.compensated else arc.peak_planned_thrust_n
-    peak_final /= frame.thrust_max_n
-    glide = frame.half_angle_rad - arc.glide_angle_rad
-    fuel = frame.mass_kg - arc.touchdown_mass_kg
-    excess = max(peak - 1.0, peak_final - 1.0, -margin, -glide, off_ellipsoid)
-    excess = max(excess, fuel / frame.propellant_kg - 1.0)
-    clearance, _facet = path_clearance(
-        surface, path_m, frame.clear_radius_m, 1e-3, CLEARANCE_SPACING * frame.clear_radius_m
-    )
-    handover[6] = handover_mass
-    values[0] = energy * case.acceleration_m_s2**2 * frame.descent_s + arc.energy_m2_s3
-    values[1] = frame.exhaust_velocity_m_s * math.log(frame.mass_kg / arc.touchdown_mass_kg)
-    values[2] = fuel
-    values[3], values[4], values[5] = max(peak, peak_final), peak, peak_final
-    values[6], values[7], values[8] = margin, math.degrees(glide), clearance
-    values[9] = excess if excess > LIMIT_TOLERANCE else 0.0
+    field = case.gravity_kind, case.gravity_params
+    call(measure, (frame, surface, *field, descent, handover, target_m, normal, path_m, values))
 
 
 def deliver_many(
@@ -198,7 +269,8 @@ def deliver_many(
 ) -> None:
     """Deliver a batch of facets; see :func:`deliver`."""
     flights = new_flights(case, DELIVERY_SUBSTEPS)
-    fill_deliveries(case, frame, surface, thrusts, targets_m, normals, flights, out)
+    measure = measure_of(frame, surface, case.gravity_kind, case.gravity_params)
+    fill_deliveries(case, frame, surface, thrusts, targets_m, normals, flights, measure, out)
 
 
 @kernel
@@ -210,6 +282,7 @@ def fill_deliveries(
     targets_m: Floats,
     normals: Floats,
     flights: Flights,
+    measure: Callee,
     out: Deliveries,
 ) -> None:
     """Deliver a batch of facets, as many together as there are lanes; see :func:`deliver`."""
@@ -228,6 +301,7 @@ def fill_deliveries(
                 flights,
                 place,
                 path_m,
+                measure,
                 out.values[i],
                 out.handover[i],
             )

@@ -7,12 +7,14 @@ and refined on the cubic Hermite interpolant between the step's ends.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.kernel import part
-from landing_cli.reach.costate_dynamics import COLUMNS, Extremal
+from landing_cli.kernel_record import by_reference
+from landing_cli.reach.costate_dynamics import Extremal
 
 Floats = NDArray[np.float64]
 
@@ -21,6 +23,20 @@ MAX_DIPS = 4
 FAR = 1.2
 # A dip: the step it lies in, where in the step, |xi|, and the second derivative of |xi| over time.
 STEP, FRACTION, LEVEL, BEND = range(4)
+
+
+@by_reference
+class Dips(NamedTuple):
+    """The dips of one path."""
+
+    places: Floats  # (MAX_DIPS, 4)
+    normal: Floats  # (3,), and what follows: scratch space
+    r: Floats  # (3,)
+    v: Floats  # (3,)
+    dr: Floats  # (3, 7)
+    dv: Floats  # (3, 7)
+    rate: Floats  # (7,)
+    bend: Floats  # (3, 3)
 
 
 @part
@@ -44,10 +60,18 @@ def add_level_bend(inverse_axes: Floats, level: float, normal: Floats, weight: f
             K[i, j] -= weight * normal[i] * normal[j] / level
 
 
-@part
-def new_dips() -> Floats:
-    """Room for the dips of one path, (MAX_DIPS, 4)."""
-    return np.zeros((MAX_DIPS, 4))
+def new_dips() -> Dips:
+    """Room for the dips of one path."""
+    return Dips(
+        np.zeros((MAX_DIPS, 4)),
+        np.zeros(3),
+        np.zeros(3),
+        np.zeros(3),
+        np.zeros((3, 7)),
+        np.zeros((3, 7)),
+        np.zeros(7),
+        np.zeros((3, 3)),
+    )
 
 
 @part
@@ -76,14 +100,14 @@ def interpolate(h: float, f: float, before: Floats, after: Floats, r: Floats, v:
 
 
 @part
-def find_dips(inverse_axes: Floats, extremal: Extremal, n: int, dips: Floats) -> int:
+def find_dips(inverse_axes: Floats, extremal: Extremal, n: int, dips: Dips) -> int:
     """Find where the path comes near the ellipsoid and leaves again; returns how many places.
 
     The rate of |xi| changes sign from - to + within a step; the place is refined on the cubic Hermite
     interpolant. The last node belongs to the handover's row.
     """
     count = 0
-    normal, r, v = np.zeros(3), np.zeros(3), np.zeros(3)
+    places, normal, r, v = dips.places, dips.normal, dips.r, dips.v
     level_and_gradient(inverse_axes, extremal.state[0], normal)
     before = _dot3(normal, extremal.state[0], 3)
     for k in range(n):
@@ -104,8 +128,8 @@ def find_dips(inverse_axes: Floats, extremal: Extremal, n: int, dips: Floats) ->
                 else:
                     lo, f_lo, f_hi = f, rate, 0.5 * f_hi
             if level < FAR:
-                dips[count, STEP], dips[count, FRACTION], dips[count, LEVEL] = k, f, level
-                dips[count, BEND] = max((after - before) / extremal.step[k], 1e-9)
+                places[count, STEP], places[count, FRACTION], places[count, LEVEL] = k, f, level
+                places[count, BEND] = max((after - before) / extremal.step[k], 1e-9)
                 count += 1
         before = after
     return count
@@ -120,8 +144,9 @@ def _dot3(a: Floats, b: Floats, offset: int) -> float:
 def dip_row(
     inverse_axes: Floats,
     extremal: Extremal,
-    node_tangents: Floats,
-    dip: Floats,
+    nodes: Floats,
+    dips: Dips,
+    which: int,
     row: Floats,
     weight: float,
     hessian: Floats,
@@ -131,24 +156,23 @@ def dip_row(
     At a dip the time of it does not matter to first order. To second order it does: the Hessian without the
     path's own second derivative, times ``weight``, is added to ``hessian`` (7, 7).
     """
-    k, f, bend = int(dip[STEP]), dip[FRACTION], dip[BEND]
+    k, f, bend = int(dips.places[which, STEP]), dips.places[which, FRACTION], dips.places[which, BEND]
     before, after = extremal.state[k], extremal.state[k + 1]
     a, b, c, d, ta, tb, tc, td = hermite(f)
     h = extremal.step[k]
-    r, v, normal = np.zeros(3), np.zeros(3), np.zeros(3)
-    dr, dv = np.zeros((3, COLUMNS)), np.zeros((3, COLUMNS))
+    r, v, normal, dr, dv, rate, Q = dips.r, dips.v, dips.normal, dips.dr, dips.dv, dips.rate, dips.bend
     interpolate(h, f, before, after, r, v)
     level = level_and_gradient(inverse_axes, r, normal)
-    X, Y = node_tangents[k], node_tangents[k + 1]
+    X, Y = nodes[k], nodes[k + 1]
     for i in range(3):
         for j in range(7):
             dr[i, j] = a * X[i, j] + b * h * X[3 + i, j] + c * Y[i, j] + d * h * Y[3 + i, j]
             dv[i, j] = (ta * X[i, j] + tc * Y[i, j]) / h + tb * X[3 + i, j] + td * Y[3 + i, j]
-    Q = np.zeros((3, 3))
+        for j in range(3):
+            Q[i, j] = 0.0
     add_level_bend(inverse_axes, level, normal, 1.0, Q)
-    rate = np.zeros(7)
     for j in range(7):
-        row[j] = 0.0
+        row[j] = rate[j] = 0.0
         for i in range(3):
             row[j] += normal[i] * dr[i, j]
             rate[j] += normal[i] * dv[i, j]

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from landing_cli.body.bvh import SurfaceIndex
-from landing_cli.body.clearance import path_clearance
 from landing_cli.flight.extremal import thrust_ratio
 from landing_cli.kernel import inlined, kernel
-from landing_cli.reach.costate_dynamics import MAX_SPLITS, fly_extremal
-from landing_cli.reach.delivery import CLEARANCE_SPACING, LIMIT_TOLERANCE, Deliveries, Frame
+from landing_cli.kernel_address import Callee, call
+from landing_cli.reach.costate_dynamics import MAX_SPLITS
+from landing_cli.reach.delivery import Deliveries, Descent, Frame, measure_of
 from landing_cli.reach.ellipsoid_dips import LEVEL, find_dips
 from landing_cli.reach.extremal_facet import Flight, new_flight, start_extremal
 from landing_cli.reach.extremal_terms import ExtremalProblem
-from landing_cli.reach.final_stage import ARC_SAMPLES, measure_arc
+from landing_cli.reach.final_stage import ARC_SAMPLES
 
 Floats = NDArray[np.float64]
 
@@ -32,7 +30,7 @@ def _measure_descent(
     field, extremal = problem.field, flight.extremal
     level2, peak = 1e9, 0.0
     for d in range(find_dips(field.inverse_axes, extremal, steps, flight.dips)):
-        level2 = min(level2, flight.dips[d, LEVEL] ** 2)
+        level2 = min(level2, flight.dips.places[d, LEVEL] ** 2)
     for k in range(steps + 1):
         y = extremal.state[k]
         square = 0.0
@@ -54,13 +52,14 @@ def _deliver(
     normal: Floats,
     flight: Flight,
     path_m: Floats,
+    measure: Callee,
     values: Floats,
     handover: Floats,
 ) -> None:
     """Fly one facet's extremal at fine steps and measure it; see ``delivery.Deliveries``."""
     scale = problem.field.scale
     start_extremal(problem, costates, flight.extremal)
-    steps = fly_extremal(problem.field, DELIVERY_STEPS, flight.extremal)
+    steps = call(flight.fly, (problem.field, flight.extremal))
     margin, peak = _measure_descent(problem, flight, steps, path_m)
     end = flight.extremal.state[steps]
     off_ellipsoid = 0.0
@@ -70,37 +69,21 @@ def _deliver(
         off_ellipsoid += (end[i] * problem.field.inverse_axes[i]) ** 2
     off_ellipsoid = abs(off_ellipsoid - 1.0) if problem.on_ellipsoid else 0.0
     handover[6] = end[6] * frame.mass_kg
-    arc = measure_arc(
-        handover[:6],
-        handover[6],
-        target_m,
-        normal,
-        frame.final_stage_s,
-        frame.rotation_rate_rad_s,
-        frame.exhaust_velocity_m_s,
-        problem.field.kind,
-        problem.field.params,
-        path_m[steps:],
+    descent = Descent(
+        steps,
+        end[14] * scale.acceleration_m_s2**2 * scale.time_s,
+        peak,
+        margin,
+        off_ellipsoid,
+        problem.compensated,
     )
-    peak_final = arc.peak_thrust_n if problem.compensated else arc.peak_planned_thrust_n
-    peak_final /= frame.thrust_max_n
-    glide = frame.half_angle_rad - arc.glide_angle_rad
-    fuel = frame.mass_kg - arc.touchdown_mass_kg
-    excess = max(peak - 1.0, peak_final - 1.0, -margin, -glide, off_ellipsoid)
-    excess = max(excess, fuel / frame.propellant_kg - 1.0)
-    path = path_m[: steps + 1 + ARC_SAMPLES]
-    clearance, _facet = path_clearance(
-        surface, path, frame.clear_radius_m, 1e-3, CLEARANCE_SPACING * frame.clear_radius_m
+    field = problem.field
+    call(
+        measure,
+        (frame, surface, field.kind, field.params, descent, handover, target_m, normal, path_m, values),
     )
-    values[0] = end[14] * scale.acceleration_m_s2**2 * scale.time_s + arc.energy_m2_s3
-    values[1] = frame.exhaust_velocity_m_s * math.log(frame.mass_kg / arc.touchdown_mass_kg)
-    values[2] = fuel
-    values[3], values[4], values[5] = max(peak, peak_final), peak, peak_final
-    values[6], values[7], values[8] = margin, math.degrees(glide), clearance
-    values[9] = excess if excess > LIMIT_TOLERANCE else 0.0
 
 
-@kernel
 def deliver_extremals(
     problem: ExtremalProblem,
     frame: Frame,
@@ -129,8 +112,26 @@ def deliver_extremals(
     out : Deliveries
         Filled.
     """
-    flight = new_flight(DELIVERY_STEPS)
+    flight = new_flight(problem.field, DELIVERY_STEPS)
     path_m = np.empty((DELIVERY_STEPS + MAX_SPLITS + 1 + ARC_SAMPLES, 3))
+    measure = measure_of(frame, surface, problem.field.kind, problem.field.params)
+    fill_deliveries(problem, frame, surface, costates, targets_m, normals, flight, path_m, measure, out)
+
+
+@kernel
+def fill_deliveries(
+    problem: ExtremalProblem,
+    frame: Frame,
+    surface: SurfaceIndex,
+    costates: Floats,
+    targets_m: Floats,
+    normals: Floats,
+    flight: Flight,
+    path_m: Floats,
+    measure: Callee,
+    out: Deliveries,
+) -> None:
+    """Deliver a batch of facets, with room for a flight and its path; see :func:`deliver_extremals`."""
     for i in range(costates.shape[0]):
         _deliver(
             problem,
@@ -141,6 +142,7 @@ def deliver_extremals(
             normals[i],
             flight,
             path_m,
+            measure,
             out.values[i],
             out.handover[i],
         )

@@ -10,74 +10,24 @@ every search ended at a local least of the violation. Whatever did not converge 
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from landing_cli.flight.extremal import thrust_ratio
-from landing_cli.kernel import inlined, kernel
 from landing_cli.reach.delivery import VALUE_COLUMNS, new_deliveries
 from landing_cli.reach.extremal_delivery import deliver_extremals
-from landing_cli.reach.extremal_facet import (
-    COARSE_STEPS,
-    FEASIBLE,
-    FINE_STEPS,
-    OPTIMAL,
-    STUCK,
-    UNCONVERGED,
-    Ended,
-    Flight,
-    new_flight,
-    new_search,
-    search_extremal,
-)
-from landing_cli.reach.extremal_terms import (
-    MAX_ROWS,
-    N_ARC,
-    ROW_DIPS,
-    ROW_GLIDE,
-    ROW_HANDOVER,
-    ROW_PROPELLANT,
-    ExtremalProblem,
-    extremal_problem,
-    glide_weights,
-    with_guard,
-)
+from landing_cli.reach.extremal_search import FEASIBLE, STUCK, Found, new_found, new_searcher, search_batch
+from landing_cli.reach.extremal_terms import ExtremalProblem, extremal_problem
 from landing_cli.reach.free_descent import PreparedCase, prepare, survey
 from landing_cli.reach.records import Binding, FacetSolutions, LandingCase, Verdict, blank_rows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Where the thrust is at its bound throughout, the costates' size means nothing and the energy is flat. A
-# search that ends there goes on from costates small enough to throttle somewhere, at most so often.
-PLATEAUS, OFF_PLATEAU = 2, 0.9
+# Steps of a search, and of one that goes on where these were too coarse.
+COARSE_STEPS, FINE_STEPS = 30, 120
 
 # A constraint binds when loosening it by a relative unit is worth more than this part of J.
 SLIGHT_PRESSURE = 1e-5
-_THRUST, _ELLIPSOID, _GLIDE_SLOPE, _PROPELLANT, _HANDOVER = (
-    int(b) - 1
-    for b in (
-        Binding.THRUST,
-        Binding.ELLIPSOID,
-        Binding.GLIDE_SLOPE,
-        Binding.PROPELLANT,
-        Binding.HANDOVER,
-    )
-)
-
-
-class Found(NamedTuple):
-    """What the searches of a batch found."""
-
-    status: Ints  # (n,) OPTIMAL, STUCK or UNCONVERGED
-    rounds: Ints  # (n,)
-    energy: Floats  # (n,) J over a0^2 t_p
-    broken: Floats  # (n,) violation
-    costates: Floats  # (n, 7)
-    pressure: Floats  # (n, 6) by Binding: what loosening it by a relative unit takes off J
 
 
 def approximate_costates(case: LandingCase, targets_m: Floats) -> Floats:
@@ -107,124 +57,6 @@ def approximate_costates(case: LandingCase, targets_m: Floats) -> Floats:
     return np.concatenate([of_position, of_velocity, of_mass[:, None]], axis=1)
 
 
-@inlined
-def _pressures(
-    problem: ExtremalProblem, target: Floats, flight: Flight, multipliers: Floats, out: Floats
-) -> None:
-    """Gather the multipliers by constraint; a saturated descent presses by rho - 1 per unit of time."""
-    extremal = flight.extremal
-    for b in range(out.shape[0]):
-        out[b] = 0.0
-    k, t = 0, 0.0
-    while t < 1.0 - 1e-12:
-        h = extremal.step[k]
-        if extremal.saturated[k]:
-            ahead, _ = thrust_ratio(problem.field.scale.flow, False, extremal.state[k + 1])
-            behind, _ = thrust_ratio(problem.field.scale.flow, False, extremal.state[k])
-            out[_THRUST] += 0.5 * h * max(ahead + behind - 2.0, 0.0)
-        t += h
-        k += 1
-    x = extremal.state[k]
-    for j in range(N_ARC):
-        out[_THRUST] += multipliers[j]
-    for end in range(2):
-        wd, wv = glide_weights(end, problem.final_time)
-        square = 0.0
-        for i in range(3):
-            square += (wd * (x[i] - target[i]) + wv * x[3 + i]) ** 2
-        # per relative unit of the half-angle's tangent
-        loosened = problem.cos_half_angle * (1.0 - problem.cos_half_angle**2) * math.sqrt(square)
-        out[_GLIDE_SLOPE] += multipliers[ROW_GLIDE + end] * loosened
-    at_handover = abs(multipliers[ROW_HANDOVER])
-    out[_HANDOVER if problem.on_ellipsoid else _ELLIPSOID] += at_handover
-    out[_PROPELLANT] += multipliers[ROW_PROPELLANT] * problem.propellant
-    for r in range(ROW_DIPS, MAX_ROWS):
-        out[_ELLIPSOID] += multipliers[r]
-
-
-@inlined
-def _least_ratio(flow: float, flight: Flight) -> float:
-    """Least thrust that the costates ask for along an extremal; above 1 it is at its bound throughout."""
-    extremal = flight.extremal
-    least, _ = thrust_ratio(flow, False, extremal.state[0])
-    k, t = 0, 0.0
-    while t < 1.0 - 1e-12:
-        least = min(least, thrust_ratio(flow, False, extremal.state[k + 1])[0])
-        t += extremal.step[k]
-        k += 1
-    return least
-
-
-@inlined
-def _is_better(ended: Ended, status: int, energy: float, broken: float) -> bool:
-    """Whether a search ended better than the best before it."""
-    if ended.status == OPTIMAL and status == OPTIMAL:
-        return ended.energy < energy
-    return ended.status == OPTIMAL or (status != OPTIMAL and ended.broken < broken)
-
-
-@kernel
-def search_batch(
-    problem: ExtremalProblem,
-    targets: Floats,
-    normals: Floats,
-    starts: Floats,
-    n_steps: int,
-    guards: Floats,
-    found: Found,
-) -> None:
-    """Search for the best extremal of each facet.
-
-    Parameters
-    ----------
-    problem : ExtremalProblem
-        The case.
-    targets : (n, 3) float, scaled, body frame
-        Touchdown points.
-    normals : (n, 3) float
-        Outward unit normals.
-    starts : (n, k, 7) float, scaled
-        Costates to start from, tried in turn until one leads to an optimum; NaN rows are passed over.
-    n_steps : int
-        Steps of an extremal.
-    guards : (n,) float
-        Kept from the thrust bound of the final arc, for what the thrust bulges between the points.
-    found : Found
-        Filled.
-    """
-    here, there, spare = new_flight(n_steps), new_flight(n_steps), new_flight(n_steps)
-    search = new_search(problem, n_steps)
-    costates = np.zeros(7)
-    for i in range(targets.shape[0]):
-        found.status[i], found.broken[i], found.energy[i] = UNCONVERGED, math.inf, math.inf
-        guarded = with_guard(problem, guards[i])
-        for s in range(starts.shape[1]):
-            given = True
-            for a in range(7):
-                costates[a] = starts[i, s, a]
-                given = given and math.isfinite(costates[a])
-            if not given:
-                continue
-            for _ in range(1 + PLATEAUS):
-                ended, last = search_extremal(
-                    guarded, targets[i], normals[i], costates, here, there, spare, search
-                )
-                found.rounds[i] += ended.rounds
-                if _is_better(ended, found.status[i], found.energy[i], found.broken[i]):
-                    found.status[i], found.energy[i] = ended.status, ended.energy
-                    found.broken[i] = ended.broken
-                    for a in range(7):
-                        found.costates[i, a] = costates[a]
-                    _pressures(problem, targets[i], last, search.multipliers, found.pressure[i])
-                least = _least_ratio(problem.field.scale.flow, last)
-                if ended.status != OPTIMAL or least <= 1.0:
-                    break
-                for a in range(7):  # step off the plateau
-                    costates[a] *= OFF_PLATEAU / least
-            if found.status[i] == OPTIMAL:
-                break
-
-
 def _search(
     prepared: PreparedCase,
     problem: ExtremalProblem,
@@ -233,18 +65,11 @@ def _search(
     n_steps: int,
     guards: Floats,
 ) -> Found:
-    n = len(facets)
-    found = Found(
-        np.zeros(n, dtype=np.int64),
-        np.zeros(n, dtype=np.int64),
-        np.zeros(n),
-        np.zeros(n),
-        np.zeros((n, 7)),
-        np.zeros((n, len(Binding) - 1)),
-    )
+    n, found = len(facets), new_found(len(facets))
     targets = prepared.shared.centroids_m[facets] / problem.field.scale.length_m
     starts = np.ascontiguousarray(starts, dtype=np.float64).reshape(n, -1, 7)
-    search_batch(problem, targets, prepared.shared.normals[facets], starts, n_steps, guards, found)
+    searcher = new_searcher(problem, n_steps)
+    search_batch(problem, targets, prepared.shared.normals[facets], starts, guards, searcher, found)
     return found
 
 

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from landing_cli.body.gravity.kernels import acceleration_and_gradient
 from landing_cli.flight.extremal import extremal_scale
 from landing_cli.kernel import inlined, part
+from landing_cli.kernel_record import by_reference
 from landing_cli.reach.costate_dynamics import Field, gravity_point
 from landing_cli.reach.ellipsoid_dips import MAX_DIPS, add_level_bend, level_and_gradient
 from landing_cli.reach.records import LandingCase
@@ -44,6 +45,7 @@ ROW_DIPS = N_ARC + 5
 MAX_ROWS = ROW_DIPS + MAX_DIPS
 
 
+@by_reference
 class ExtremalProblem(NamedTuple):
     """One landing case in scaled units, body frame."""
 
@@ -55,7 +57,38 @@ class ExtremalProblem(NamedTuple):
     cos_half_angle: float
     compensated: bool
     on_ellipsoid: bool
-    guard: float  # kept from the thrust bound of the final arc, for what it bulges between the points
+
+
+@by_reference
+class ArcWork(NamedTuple):
+    """Scratch space for the final arc's terms."""
+
+    vector: Floats  # (3,)
+    slopes: Floats  # (3, 6) of the vector
+    r: Floats  # (3,)
+    v: Floats  # (3,)
+    normal: Floats  # (3,)
+    gravity: Floats  # (3, 3) gradient of gravity
+    of_norm: Floats  # (7,)
+    of_last: Floats  # (7,)
+    of_pull: Floats  # (7,)
+    of_mass: Floats  # (7,)
+
+
+def new_arc_work() -> ArcWork:
+    """Allocate scratch space."""
+    return ArcWork(
+        np.zeros(3),
+        np.zeros((3, 6)),
+        np.zeros(3),
+        np.zeros(3),
+        np.zeros(3),
+        np.zeros((3, 3)),
+        np.zeros(7),
+        np.zeros(7),
+        np.zeros(7),
+        np.zeros(7),
+    )
 
 
 def extremal_problem(case: LandingCase) -> ExtremalProblem:
@@ -78,7 +111,8 @@ def extremal_problem(case: LandingCase) -> ExtremalProblem:
     inverse_axes = scale.length_m / np.array(case.ellipsoid_m, dtype=np.float64)
     bound = craft.propellant_kg
     return ExtremalProblem(
-        field=Field(gravity.kind, gravity.params, scale, inverse_axes),
+        # writable, as they come out of a pickle
+        field=Field(gravity.kind, gravity.params.copy(), scale, inverse_axes),
         position=np.array(case.position_m, dtype=np.float64) / scale.length_m,
         velocity=np.array(case.velocity_m_s, dtype=np.float64) * scale.time_s / scale.length_m,
         final_time=case.final_stage_s / case.descent_s,
@@ -86,24 +120,6 @@ def extremal_problem(case: LandingCase) -> ExtremalProblem:
         cos_half_angle=math.cos(case.glide_slope_half_angle_rad),
         compensated=case.final_stage_thrust == "compensated",
         on_ellipsoid=case.handover == "on_ellipsoid",
-        guard=0.0,
-    )
-
-
-@part
-def with_guard(problem: ExtremalProblem, guard: float) -> ExtremalProblem:
-    """Return the problem with another guard of the thrust bound."""
-    p = problem
-    return ExtremalProblem(
-        p.field,
-        p.position,
-        p.velocity,
-        p.final_time,
-        p.propellant,
-        p.cos_half_angle,
-        p.compensated,
-        p.on_ellipsoid,
-        guard,
     )
 
 
@@ -123,9 +139,10 @@ def _arc_weights(sigma: float, T: float) -> tuple[float, float, float, float, fl
 
 @part
 def _arc_acceleration(
-    problem: ExtremalProblem, target: Floats, x: Floats, sigma: float, star: Floats, D: Floats
+    problem: ExtremalProblem, target: Floats, x: Floats, sigma: float, work: ArcWork
 ) -> None:
     """Total acceleration a* on the final arc (3,), and its derivative (3, 6) with respect to (r_p, v_p)."""
+    star, D = work.vector, work.slopes
     ad, av, _, _, _, _ = _arc_weights(sigma, problem.final_time)
     for i in range(3):
         star[i] = ad * (x[i] - target[i]) + av * x[3 + i]
@@ -135,14 +152,12 @@ def _arc_acceleration(
 
 
 @part
-def _arc_thrust(
-    problem: ExtremalProblem, target: Floats, x: Floats, sigma: float, thrust: Floats, D: Floats
-) -> None:
+def _arc_thrust(problem: ExtremalProblem, target: Floats, x: Floats, sigma: float, work: ArcWork) -> None:
     """Thrust per mass on the final arc and its derivative: a* less gravity and the frame's accelerations."""
-    _arc_acceleration(problem, target, x, sigma, thrust, D)
+    thrust, D, r, v, G = work.vector, work.slopes, work.r, work.v, work.gravity
+    _arc_acceleration(problem, target, x, sigma, work)
     _, _, rd, rv, vd, vv = _arc_weights(sigma, problem.final_time)
     field, w = problem.field, problem.field.scale.spin
-    r, v = np.zeros(3), np.zeros(3)
     for i in range(3):
         r[i] = target[i] + rd * (x[i] - target[i]) + rv * x[3 + i]
         v[i] = vd * (x[i] - target[i]) + vv * x[3 + i]
@@ -152,13 +167,15 @@ def _arc_thrust(
     thrust[0] -= g[0] / field.scale.acceleration_m_s2 + w * (2.0 * v[1] + w * r[0])
     thrust[1] -= g[1] / field.scale.acceleration_m_s2 + w * (-2.0 * v[0] + w * r[1])
     thrust[2] -= g[2] / field.scale.acceleration_m_s2
-    G = ((g[3], g[6], g[7]), (g[6], g[4], g[8]), (g[7], g[8], g[5]))
+    G[0, 0], G[1, 1], G[2, 2] = g[3], g[4], g[5]
+    G[0, 1], G[0, 2], G[1, 2] = g[6], g[7], g[8]
+    G[1, 0], G[2, 0], G[2, 1] = g[6], g[7], g[8]
     for b in range(2):
         of_r, of_v = (rd, vd) if b == 0 else (rv, vv)
         c = 3 * b
         for i in range(3):
             for j in range(3):
-                D[i, c + j] -= grow * G[i][j] * of_r
+                D[i, c + j] -= grow * G[i, j] * of_r
         D[0, c] -= w * w * of_r
         D[1, c + 1] -= w * w * of_r
         D[0, c + 1] -= 2.0 * w * of_v
@@ -190,7 +207,13 @@ def final_energy(problem: ExtremalProblem, target: Floats, x: Floats, gradient: 
 
 @inlined
 def _thrust_rows(
-    problem: ExtremalProblem, target: Floats, x: Floats, values: Floats, jacobian: Floats
+    problem: ExtremalProblem,
+    guard: float,
+    target: Floats,
+    x: Floats,
+    values: Floats,
+    jacobian: Floats,
+    work: ArcWork,
 ) -> None:
     """Thrust along the final arc, and the propellant left at touchdown.
 
@@ -199,11 +222,13 @@ def _thrust_rows(
     """
     n = ARC_INTERVALS
     width = 0.5 * problem.field.scale.flow * problem.final_time / n
-    vector, D, d_norm, d_last, d_pull = np.zeros(3), np.zeros((3, 6)), np.zeros(7), np.zeros(7), np.zeros(7)
-    mass, last, d_mass = x[6], 0.0, np.zeros(7)
+    vector, D, mass, last = work.vector, work.slopes, x[6], 0.0
+    d_norm, d_last, d_pull, d_mass = work.of_norm, work.of_last, work.of_pull, work.of_mass
+    for a in range(7):
+        d_norm[a] = d_last[a] = d_mass[a] = 0.0
     d_mass[6] = 1.0
     for j in range(n, -1, -1):
-        _arc_thrust(problem, target, x, j / n, vector, D)
+        _arc_thrust(problem, target, x, j / n, work)
         norm = _norm_and_slope(vector, D, d_norm)
         if j < n:
             decay = math.exp(-width * (norm + last))
@@ -214,9 +239,9 @@ def _thrust_rows(
         for a in range(7):
             d_last[a], d_pull[a] = d_norm[a], d_norm[a]
         if not problem.compensated:
-            _arc_acceleration(problem, target, x, j / n, vector, D)
+            _arc_acceleration(problem, target, x, j / n, work)
             pull = _norm_and_slope(vector, D, d_pull)
-        values[j] = 0.5 * (1.0 - (mass * pull) ** 2) - problem.guard
+        values[j] = 0.5 * (1.0 - (mass * pull) ** 2) - guard
         for a in range(7):
             jacobian[j, a] = -mass * pull * (d_mass[a] * pull + mass * d_pull[a])
         last = norm
@@ -228,15 +253,20 @@ def _thrust_rows(
 @part
 def handover_rows(
     problem: ExtremalProblem,
+    guard: float,
     target: Floats,
     facet_normal: Floats,
     x: Floats,
     values: Floats,
     jacobian: Floats,
+    work: ArcWork,
 ) -> None:
-    """Fill values and derivatives (.., 7) of the rows that the handover state decides."""
-    normal = np.zeros(3)
-    _thrust_rows(problem, target, x, values, jacobian)
+    """Fill values and derivatives (.., 7) of the rows that the handover state decides.
+
+    The guard is kept from the thrust bound of the final arc, for what the thrust bulges between the points.
+    """
+    normal = work.normal
+    _thrust_rows(problem, guard, target, x, values, jacobian, work)
     _glide_rows(problem, target, facet_normal, x, values, jacobian)
     values[ROW_HANDOVER] = level_and_gradient(problem.field.inverse_axes, x, normal) - 1.0
     for a in range(7):
@@ -277,7 +307,7 @@ def _glide_rows(
 
 @part
 def handover_hessian(
-    problem: ExtremalProblem, target: Floats, x: Floats, multipliers: Floats, K: Floats
+    problem: ExtremalProblem, target: Floats, x: Floats, multipliers: Floats, K: Floats, work: ArcWork
 ) -> None:
     """Hessian (7, 7) of J2 less the multipliers times the handover's rows; the mass is held fixed."""
     T = problem.final_time
@@ -289,21 +319,21 @@ def handover_hessian(
         K[3 + i, 3 + i] += 4.0 / T
         K[i, 3 + i] += 6.0 / T**2
         K[3 + i, i] += 6.0 / T**2
-    thrust, D = np.zeros(3), np.zeros((3, 6))
+    D, w, normal = work.slopes, work.vector, work.normal
     for j in range(N_ARC):
         if multipliers[j] > 0.0:
             sigma = j / ARC_INTERVALS
             if problem.compensated:
-                _arc_thrust(problem, target, x, sigma, thrust, D)
+                _arc_thrust(problem, target, x, sigma, work)
             else:
-                _arc_acceleration(problem, target, x, sigma, thrust, D)
+                _arc_acceleration(problem, target, x, sigma, work)
             weight = multipliers[j] * x[6] * x[6]
             for a in range(6):
                 for b in range(6):
                     K[a, b] += weight * (D[0, a] * D[0, b] + D[1, a] * D[1, b] + D[2, a] * D[2, b])
     for end in range(2):
         wd, wv = glide_weights(end, T)
-        w, norm2 = np.zeros(3), 0.0
+        norm2 = 0.0
         for i in range(3):
             w[i] = wd * (x[i] - target[i]) + wv * x[3 + i]
             norm2 += w[i] * w[i]
@@ -316,6 +346,5 @@ def handover_hessian(
                 K[i, 3 + j] += wd * wv * bend
                 K[3 + i, j] += wd * wv * bend
                 K[3 + i, 3 + j] += wv * wv * bend
-    normal = np.zeros(3)
     level = level_and_gradient(problem.field.inverse_axes, x, normal)
     add_level_bend(problem.field.inverse_axes, level, normal, -multipliers[ROW_HANDOVER], K)

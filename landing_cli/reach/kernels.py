@@ -22,12 +22,19 @@ from landing_cli.body.ray_cast import first_hits_into
 from landing_cli.compile_cache import is_cached
 from landing_cli.parallel.forks import share_out
 from landing_cli.reach.certificate import GravityBounds
-from landing_cli.reach.delivery import deliver_many, new_deliveries
+from landing_cli.reach.delivery import (
+    DELIVERY_SUBSTEPS,
+    fill_deliveries,
+    measure_landing,
+    measure_of,
+    new_deliveries,
+)
 from landing_cli.reach.ellipsoid_arcs import arc_cuts_many, freeze_many, lowest_levels, lowest_levels_between
 from landing_cli.reach.free_batch import new_batch, no_cuts, no_walls, solve_many
 from landing_cli.reach.free_descent import PreparedCase, Surroundings, prepare, survey
 from landing_cli.reach.free_solve import LaneSolver, judge, linearise, new_solver, take_step
 from landing_cli.reach.records import LandingCase
+from landing_cli.reach.shooting import new_flights
 
 _typeof: Any = numba.typeof
 
@@ -42,13 +49,13 @@ def are_compiled(descent: str, terrain: str = "report") -> bool:
     terrain : {"report", "require"}
         Whether a path that cuts the mesh is a landing.
     """
-    kernels: list[Any] = [solve_many, linearise, take_step, judge]
+    kernels: list[Any] = [solve_many, linearise, take_step, judge, fill_deliveries, measure_landing]
     if terrain == "require":
         kernels += [signed_distances_into, first_hits_into]
     if descent == "extremal":
-        from landing_cli.reach.extremal_descent import search_batch
+        from landing_cli.reach.extremal_kernels import KERNELS
 
-        kernels.append(search_batch)
+        kernels += KERNELS
     return all(is_cached(kernel) for kernel in kernels)
 
 
@@ -69,9 +76,20 @@ def compile_parts(case: LandingCase) -> None:
     )
     prepared = prepare(case, shared)
     # the longest first
-    parts = [_flight, _conic, _solve, _delivery, _verdicts, _ellipsoid_arcs, lambda _: survey(case)]
+    parts = [
+        _flight,
+        _conic,
+        _solve,
+        _measures,
+        _delivery,
+        _verdicts,
+        _ellipsoid_arcs,
+        lambda _: survey(case),
+    ]
     if case.descent == "extremal":
-        parts.insert(0, _extremals)
+        from landing_cli.reach.extremal_kernels import PARTS
+
+        parts[:0] = PARTS
     if case.terrain == "require":
         parts.append(_terrain)
     with np.errstate(all="ignore"):
@@ -101,19 +119,19 @@ def _flight(prepared: PreparedCase) -> None:
     _solver(prepared).linearise.compile()
 
 
+def _measures(prepared: PreparedCase) -> None:
+    """What is measured on an accurate flight, and the final arc."""
+    case = prepared.coarse
+    measure_of(prepared.frame, prepared.shared.surface, case.gravity_kind, case.gravity_params).compile()
+
+
 def _delivery(prepared: PreparedCase) -> None:
-    """The accurate flight and its measures."""
-    shared, first = prepared.shared, slice(0, 1)
-    thrust = np.zeros((1, len(prepared.coarse.mid_cos), 3))
-    deliver_many(
-        prepared.coarse,
-        prepared.frame,
-        shared.surface,
-        thrust,
-        shared.centroids_m[first],
-        shared.normals[first],
-        new_deliveries(1),
-    )
+    """The accurate flight."""
+    case, surface, one = prepared.coarse, prepared.shared.surface, np.ones((1, 3))
+    thrust, flights = np.zeros((1, len(case.mid_cos), 3)), new_flights(case, DELIVERY_SUBSTEPS)
+    measure = measure_of(prepared.frame, surface, case.gravity_kind, case.gravity_params)
+    arguments = case, prepared.frame, surface, thrust, one, one, flights, measure, new_deliveries(1)
+    fill_deliveries.compile(tuple(_typeof(argument) for argument in arguments))
 
 
 def _ellipsoid_arcs(prepared: PreparedCase) -> None:
@@ -140,10 +158,3 @@ def _solve(prepared: PreparedCase) -> None:
     batch = no_cuts(1, n), np.ones(1), no_walls(1), 1.0, True, 1, 1
     arguments = case, one, one, *batch, prepared.coarse_tube, 1.0, False, _solver(prepared), new_batch(1, n)
     solve_many.compile(tuple(_typeof(argument) for argument in arguments))
-
-
-def _extremals(prepared: PreparedCase) -> None:
-    """The paper's extremals."""
-    from landing_cli.reach.extremal_descent import solve_prepared
-
-    solve_prepared(prepared, np.zeros(1, dtype=np.int64))
