@@ -12,6 +12,7 @@ one (begin with ``np.int64(0)``).
 
 from __future__ import annotations
 
+import gc
 from typing import Any
 
 from numba import njit
@@ -136,7 +137,7 @@ def _remembered_call_type(function: Any, context: Any, args: Any, kws: Any) -> A
 
 
 class _OwnCompiler(_Compiler):  # type: ignore[misc]
-    """What spares numba's typing most of its work: a fifth of a compilation."""
+    """What spares numba most of its typing, a fifth of a compilation, and Python its looks for garbage."""
 
     def __init__(self, *pieces: Any) -> None:
         *usual, flags, names = pieces
@@ -144,12 +145,15 @@ class _OwnCompiler(_Compiler):  # type: ignore[misc]
 
     def _compile_core(self) -> Any:
         # numba's lock is held; a kernel compiles others meanwhile
-        outer = _Function.get_call_type
+        outer, collects = _Function.get_call_type, gc.isenabled()
         _Function.get_call_type = _remembered_call_type
+        gc.disable()  # looking for garbage among what numba makes, and keeps, takes a sixth of a compilation
         try:
             return super()._compile_core()
         finally:
             _Function.get_call_type = outer
+            if collects:
+                gc.enable()
 
 
 class _KernelCompiler(_OwnCompiler):

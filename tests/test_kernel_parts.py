@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import gc
 from typing import Any
 
 import numpy as np
 import pytest
 from kernel_calls import from_python
-from numba import njit
+from numba import njit, types
 from numba.core.types.functions import BaseFunction
+from numba.extending import intrinsic
 
 from landing_cli.kernel import kernel, part
 
@@ -75,3 +77,25 @@ def test_numba_types_as_before_once_a_kernel_is_compiled_or_refused() -> None:
         wrong(1.0)
     assert from_python(part(mixture))(3.0, 2.0) == mixture(3.0, 2.0)
     assert BaseFunction.get_call_type.__module__ == BaseFunction.__module__
+
+
+@intrinsic
+def collecting(_context: Any) -> Any:
+    """Whether Python looks for garbage while this is compiled."""
+    now = gc.isenabled()
+    return types.boolean(), lambda context, *_: context.get_constant(types.boolean, now)
+
+
+@pytest.mark.parametrize("collects", [True, False])
+def test_python_looks_for_garbage_as_before_but_not_while_a_kernel_compiles(collects: bool) -> None:
+    @kernel
+    def asked() -> tuple[bool, bool]:
+        return collecting(), collects  # one kernel for each, in the cache too
+
+    was = gc.isenabled()
+    try:
+        (gc.enable if collects else gc.disable)()
+        assert asked() == (False, collects)
+        assert gc.isenabled() == collects
+    finally:
+        (gc.enable if was else gc.disable)()
