@@ -51,7 +51,7 @@ from landing_cli.scenario.schema import Reach
 from landing_cli.scenario.sections import for_mission, reach_section
 from landing_cli.scenario.show import to_yaml
 
-COMPILING = "compiling the kernels (once after an installation; 20 to 30 s)"
+COMPILING = "compiling the kernels (once after an installation; 15 to 30 s)"
 COMPILING_FACETS = 8
 
 
