@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache, singledispatch
 from itertools import pairwise
 
@@ -132,7 +133,7 @@ def _pieces(leg: AccelerationLeg, w: float, ve: float) -> list[ThrustPiece]:
     return [ThrustPiece(float(a), float(b), thrust) for a, b in pairwise(smooth_edges(leg))]
 
 
-def _sampled(leg: AccelerationLeg, w: float, ve: float) -> SampledControl:
+def _sampled(leg: AccelerationLeg, w: float, ve: float, _step_max_s: float = math.inf) -> SampledControl:
     parts = _steps_per_interval(leg)
     steps = np.repeat(np.diff(smooth_edges(leg)) / parts, parts)
     knots = np.concatenate([[0.0], np.cumsum(steps)])

@@ -28,8 +28,6 @@ from landing_cli.kernel import kernel
 FloatArray = NDArray[np.float64]
 
 # steps of the order-8 integrator: halving them moves a landing by less than 1e-8 m (tested)
-# longer ones pass too much of a polyhedron's field: 30 s, 34 m over Eros, led 4 mm astray
-_NODE_STEP_MAX_S = 25.0
 _EXTREMAL_STEPS = 256
 _ARC_STEPS = 16
 _KINKS = 32
@@ -93,7 +91,7 @@ def thrust_pieces(leg: Leg, w: float, ve: float) -> list[ThrustPiece]:
 
 
 @singledispatch
-def sampled_control(leg: Leg, w: float, ve: float) -> SampledControl:
+def sampled_control(leg: Leg, w: float, ve: float, step_max_s: float = math.inf) -> SampledControl:
     """Return a leg's thrust at the stages of the order-8 integrator.
 
     Parameters
@@ -104,6 +102,9 @@ def sampled_control(leg: Leg, w: float, ve: float) -> SampledControl:
         Spin rate.
     ve : float, m/s
         Effective exhaust velocity.
+
+    step_max_s : float, s
+        Longest step along thrust nodes, which are a step each otherwise; other legs have short ones.
 
     Returns
     -------
@@ -129,8 +130,8 @@ def _nodes_pieces(leg: ThrustNodesLeg, w: float, ve: float) -> list[ThrustPiece]
 
 
 @sampled_control.register
-def _nodes_sampled(leg: ThrustNodesLeg, w: float, ve: float) -> SampledControl:
-    count = max(1, math.ceil(leg.duration_s / len(leg.thrust_n) / _NODE_STEP_MAX_S))
+def _nodes_sampled(leg: ThrustNodesLeg, w: float, ve: float, step_max_s: float = math.inf) -> SampledControl:
+    count = max(1, math.ceil(leg.duration_s / len(leg.thrust_n) / step_max_s))
     forces = np.repeat(leg.thrust_n, count, axis=0)
     steps = np.full(len(forces), leg.duration_s / len(forces))
     times, knots = _stage_times(steps)
@@ -207,7 +208,7 @@ def _extremal_thrust(
 
 
 @sampled_control.register
-def _costate_sampled(leg: CostateLeg, w: float, ve: float) -> SampledControl:
+def _costate_sampled(leg: CostateLeg, w: float, ve: float, _step_max_s: float = math.inf) -> SampledControl:
     scale, y = _scaled(leg, w, ve)
     size = _EXTREMAL_STEPS + _KINKS
     steps, stages, knots = np.zeros(size), np.zeros((size, STAGES, 3)), np.zeros((size + 1, 3))
@@ -259,7 +260,7 @@ def _arc_pieces(leg: FinalArcLeg, w: float, ve: float) -> list[ThrustPiece]:
 
 
 @sampled_control.register
-def _arc_sampled(leg: FinalArcLeg, w: float, ve: float) -> SampledControl:
+def _arc_sampled(leg: FinalArcLeg, w: float, ve: float, _step_max_s: float = math.inf) -> SampledControl:
     steps = np.full(_ARC_STEPS, leg.duration_s / _ARC_STEPS)
     times, knots = _stage_times(steps)
     return SampledControl(steps, _arc_thrusts(leg, w, times), _arc_thrusts(leg, w, knots), per_mass=True)

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
+from shape_helpers import box
 
-from landing_cli.body.gravity.field import GravityField
+from landing_cli.body.gravity.field import GravityField, GravityKind
 from landing_cli.body.gravity.harmonics import harmonics_field
 from landing_cli.body.gravity.point_mass import point_mass_field
-from landing_cli.flight import control
+from landing_cli.body.gravity.polyhedron import polyhedron_field
+from landing_cli.flight import control, replay as replay_module
 from landing_cli.flight.extremal import extremal_rates, extremal_scale, scaled_start, thrust_ratio
 from landing_cli.flight.gauss import GAUSS_A, GAUSS_B, GAUSS_C
 from landing_cli.flight.legs import CostateLeg, FinalArcLeg, Leg, ThrustNodesLeg
@@ -63,7 +65,8 @@ def test_halving_the_steps_of_the_fast_integrator_changes_nothing(
 ) -> None:
     legs = [leg, arc_after(leg)]
     coarse = fly(legs, "gauss")
-    monkeypatch.setattr(control, "_NODE_STEP_MAX_S", 500.0 / 40 / 2)
+    monkeypatch.setattr(replay_module, "FACETS_STEP_MAX_S", 500.0 / 40 / 2)
+    monkeypatch.setattr(replay_module, "_OF_FACETS", tuple(GravityKind))
     for name in ("_EXTREMAL_STEPS", "_ARC_STEPS"):
         monkeypatch.setattr(control, name, 2 * getattr(control, name))
     fine = fly(legs, "gauss")
@@ -172,7 +175,21 @@ def test_many_flights_equal_single_ones() -> None:
         assert np.array_equal(flown.position_m, fly(list(legs), "gauss").position_m)
 
 
-def test_long_nodes_are_flown_in_short_steps() -> None:
-    sampled = control.sampled_control(ThrustNodesLeg(1200.0, np.ones((40, 3))), SPIN, EXHAUST)
-    assert sampled.steps_s.max() == 15.0
-    assert sampled.steps_s.sum() == pytest.approx(1200.0)
+def test_thrust_nodes_are_flown_in_steps_as_short_as_is_asked() -> None:
+    nodes = ThrustNodesLeg(1200.0, np.ones((40, 3)))
+    assert control.sampled_control(nodes, SPIN, EXHAUST).steps_s.tolist() == [30.0] * 40
+    sampled = control.sampled_control(nodes, SPIN, EXHAUST, 7.0)
+    assert sampled.steps_s.tolist() == [6.0] * 200
+    np.testing.assert_array_equal(
+        sampled.knots[5::5], control.sampled_control(nodes, SPIN, EXHAUST).knots[1:]
+    )
+
+
+def test_flights_over_facets_take_short_steps_and_others_their_nodes() -> None:
+    shape = box((100.0, 100.0, 100.0), (-50.0, -50.0, -50.0))
+    nodes = ThrustNodesLeg(1200.0, np.zeros((40, 3)))
+    longest = [
+        np.diff(fly([nodes], "gauss", field).t_s).max()
+        for field in (FIELD, polyhedron_field(shape.vertices, shape.faces, 5.0))
+    ]
+    assert_allclose(longest, [30.0, 6.0], rtol=1e-12)
