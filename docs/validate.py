@@ -43,7 +43,7 @@ HOW = """## 18. How to regenerate
 
 `make validate` solves the three shipped scenarios into `runs/` (a complete result of the same scenario, shape and
 version is read back, an unfinished one continued), and computes this page. A result does not notice an edit of
-the solver within one version: delete `runs/*.h5` first, then. From nothing it takes about half an hour on two cores.
+the solver within one version: delete `runs/*.h5` first, then. From nothing it takes 30 to 40 minutes on two cores.
 
 Sections 8 and 9 need a reference shape, the search of section 10 a reference catalogue (`LANDING_REFERENCE_DATA`);
 they take some minutes more. No other table here does:

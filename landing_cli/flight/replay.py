@@ -24,7 +24,7 @@ RTOL = 1e-11
 ATOL = np.array([1e-8] * 3 + [1e-10] * 3 + [1e-8])  # m, m/s, kg
 _SAMPLE_S = 5.0
 
-# A shape's pull changes within metres of its facets: steps of 25 s, 15 m over Eros, led 0.8 mm astray.
+# A shape's pull changes within metres of its facets: steps of 15 s, 15 m over Eros, led 0.8 mm astray.
 FACETS_STEP_MAX_S = 6.0
 _OF_FACETS = (GravityKind.POLYHEDRON, GravityKind.BOXED, GravityKind.INTERPOLATED)
 
