@@ -147,7 +147,7 @@ class _OwnCompiler(_Compiler):  # type: ignore[misc]
         # numba's lock is held; a kernel compiles others meanwhile
         outer, collects = _Function.get_call_type, gc.isenabled()
         _Function.get_call_type = _remembered_call_type
-        gc.disable()  # looking for garbage among what numba makes, and keeps, takes a seventh of a compilation
+        gc.disable()  # looking for garbage among what numba makes, and keeps, takes a seventh of the time
         try:
             return super()._compile_core()
         finally:

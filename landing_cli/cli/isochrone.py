@@ -219,6 +219,10 @@ def _replacements(tof_s: str | None) -> list[str]:
         raise UsageError(
             told, where="--tof-s", fix="write FIRST:LAST:STEP in seconds, as 400:1600:25"
         ) from error
+    if numbers[1] <= numbers[0]:
+        raise UsageError(
+            f"{tof_s[:60]!r} ends before it begins", where="--tof-s", fix="give the earlier time first"
+        )
     keys = ("tof_min_s", "tof_max_s", "step_s")
     return [f"isochrone.{key}={number:.12g}" for key, number in zip(keys, numbers, strict=False)]
 

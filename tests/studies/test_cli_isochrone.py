@@ -168,6 +168,11 @@ def test_a_range_that_is_none_is_refused(folder: Path, capsys: Capture, tof_s: s
     assert not (folder / "runs").exists()
 
 
+def test_a_range_backwards_is_told_by_the_option_that_was_typed(folder: Path, capsys: Capture) -> None:
+    assert main("reach", ["isochrone", "probe", "--tof-s", "900:700:25"]) == ExitCode.USAGE
+    assert "--tof-s: '900:700:25' ends before it begins" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("override", "told"),
     [
